@@ -69,17 +69,17 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("group", nargs="*", help="what is measured; all by default")
     parser.add_argument("--quick", action="store_true", help="what can be measured in less than a minute")
     parser.add_argument("--record", action="store_true", help="keep the lines as what later runs are compared with")
-    chosen = parser.parse_args(arguments)
-    if unknown := [name for name in chosen.group if name not in GROUPS]:
+    options = parser.parse_args(arguments)
+    if unknown := [name for name in options.group if name not in GROUPS]:
         parser.error(f"there is no group {unknown[0]}; there are {', '.join(GROUPS)}")
-    names = chosen.group or (_QUICK if chosen.quick else tuple(GROUPS))
-    before = table.load_recorded_run()
-    measured = [row for name in names for row in GROUPS[name](1 if chosen.quick else 5)]
-    table.print_rows(measured, before)
-    table.write_rows(table.LATEST, measured)
-    if chosen.record:
-        table.write_rows(table.RECORDED, measured)
-    return int(any(row.gates for row in measured))
+    names = options.group or (_QUICK if options.quick else tuple(GROUPS))
+    recorded_run = table.load_recorded_run()
+    measured_rows = [row for name in names for row in GROUPS[name](1 if options.quick else 5)]
+    table.print_rows(measured_rows, recorded_run)
+    table.write_rows(table.LATEST, measured_rows)
+    if options.record:
+        table.write_rows(table.RECORDED, measured_rows)
+    return int(any(row.gates for row in measured_rows))
 
 
 if __name__ == "__main__":

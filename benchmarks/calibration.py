@@ -43,16 +43,16 @@ def _run_loop() -> None:
 
 def _make_round_trips() -> None:
     """Make round trips between this process and an echo process."""
-    here, there = socket.socketpair()
+    parent_end, child_end = socket.socketpair()
     pid = os.fork()
     if pid == 0:
-        here.close()
-        while text := there.recv(_BYTES):
-            there.sendall(text)
+        parent_end.close()
+        while text := child_end.recv(_BYTES):
+            child_end.sendall(text)
         os._exit(0)
-    there.close()
+    child_end.close()
     for _ in range(_TURNS):
-        here.sendall(b"x" * _BYTES)
-        here.recv(_BYTES)
-    here.close()
+        parent_end.sendall(b"x" * _BYTES)
+        parent_end.recv(_BYTES)
+    parent_end.close()
     os.waitpid(pid, 0)

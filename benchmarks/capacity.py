@@ -80,11 +80,11 @@ def simulate(rate: float, workers: int, load: SubmissionCosts, submissions: int,
     from half to one and a half times its mean.
     """
     queue = _Queue(workers, load, random.Random(seed))
-    arrivals, at = [], 0.0
+    arrivals, moment = [], 0.0
     for number in range(submissions):
-        at += queue.chance.expovariate(rate)
-        arrivals.append(at)
-        queue.schedule(at, _Step.ARRIVES, number)
+        moment += queue.chance.expovariate(rate)
+        arrivals.append(moment)
+        queue.schedule(moment, _Step.ARRIVES, number)
     queue.run()
     seconds = sorted(queue.marked[number] - begun for number, begun in enumerate(arrivals))
     return SimulationResult(
@@ -112,9 +112,9 @@ class _Queue:
         self.most_waiting = 0
         self.marked: dict[int, float] = {}
 
-    def schedule(self, at: float, step: _Step, number: int) -> None:
+    def schedule(self, moment: float, step: _Step, number: int) -> None:
         self._count += 1
-        heapq.heappush(self._events, (at, self._count, step, number))
+        heapq.heappush(self._events, (moment, self._count, step, number))
 
     def run(self) -> None:
         while self._events:
@@ -151,21 +151,21 @@ class _Queue:
             else:
                 self._work(self._load.plotting, _Step.DRAWN, self._undrawn.popleft())
 
-    def _work(self, seconds: float, then: _Step, number: int) -> None:
-        taken = seconds * self.chance.uniform(0.5, 1.5)
-        self.worked += taken
-        self.schedule(self.now + taken, then, number)
+    def _work(self, seconds: float, next_step: _Step, number: int) -> None:
+        duration = seconds * self.chance.uniform(0.5, 1.5)
+        self.worked += duration
+        self.schedule(self.now + duration, next_step, number)
 
-    def _ask(self, seconds: float, then: _Step, number: int) -> None:
-        self._asked.append((seconds, then, number))
+    def _ask(self, seconds: float, next_step: _Step, number: int) -> None:
+        self._asked.append((seconds, next_step, number))
         self._serve()
 
     def _serve(self) -> None:
         while self._free_cores and self._asked:
-            seconds, then, number = self._asked.popleft()
+            seconds, next_step, number = self._asked.popleft()
             self._free_cores -= 1
             self.served += seconds
-            self.schedule(self.now + seconds, then, number)
+            self.schedule(self.now + seconds, next_step, number)
 
 
 def main(_arguments: list[str]) -> int:
@@ -189,15 +189,15 @@ def main(_arguments: list[str]) -> int:
     for rate, name in _RATES:
         workers = compute_workers_needed(rate, load)
         for count in sorted({workers, math.ceil(rate * load.worker)}):
-            came = simulate(rate, count, load, _SUBMISSIONS)
+            result = simulate(rate, count, load, _SUBMISSIONS)
             table.add_row(
                 name,
                 f"{count}",
                 f"{rate * load.database:.2f} of {_DATABASE_CORES}",
-                *(f"{seconds:.1f} s" for seconds in came.waited),
-                f"{came.workers_busy:.0%}",
-                f"{came.database_busy:.0%}",
-                f"{came.most_waiting}",
+                *(f"{seconds:.1f} s" for seconds in result.waited),
+                f"{result.workers_busy:.0%}",
+                f"{result.database_busy:.0%}",
+                f"{result.most_waiting}",
             )
     Console(width=140).print(table)
     print(f"{_DATABASE_CORES} cores of a database are busy with {_DATABASE_CORES / load.database:.0f} a second")

@@ -34,12 +34,12 @@ def main(arguments: list[str]) -> int:
     return max(_run("SQLite", campaign, quiet), _run("PostgreSQL", campaign, quiet))
 
 
-def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int:
+def _run(database: str, campaign: Campaign, expected_hashes: list[tuple[str, ...]]) -> int:
     print(f"{database} and Valkey, {_WORKERS} workers, {campaign.grading_requests} submissions", flush=True)
     folder = Path(tempfile.mkdtemp(prefix="robomark-chaos-"))
-    with small_disk(folder, _DISK_MEGABYTES) as disk, tempfile.TemporaryDirectory() as elsewhere:
+    with small_disk(folder, _DISK_MEGABYTES) as disk, tempfile.TemporaryDirectory() as home_folder:
         server = None if database == "SQLite" else PostgresqlServer(folder)
-        home = folder / "home" if server is None else Path(elsewhere)
+        home = folder / "home" if server is None else Path(home_folder)
         url = "" if server is None else create_database(server.url)
         settings = load_settings(
             home=home,
@@ -53,14 +53,17 @@ def _run(database: str, campaign: Campaign, quiet: list[tuple[str, ...]]) -> int
             with open_store(settings) as store:
                 injector = FaultInjector(settings, store, server, _WORKERS, campaign.seed, disk)
                 try:
-                    tally = campaign.run(injector, quiet)
+                    tally = campaign.run(injector, expected_hashes)
                 finally:
                     injector.stop()
         finally:
             if server is not None:
                 server.close()
-    whole = tally.states == {JobState.DONE: campaign.grading_requests} and (tally.duplicated, tally.differing) == (0, 0)
-    print(f"{database}: {'whole' if whole else 'BROKEN'}: {tally.sentence()}", flush=True)
+    is_intact = tally.states == {JobState.DONE: campaign.grading_requests} and (tally.duplicated, tally.differing) == (
+        0,
+        0,
+    )
+    print(f"{database}: {'whole' if is_intact else 'BROKEN'}: {tally.sentence()}", flush=True)
     for error in tally.errors:
         print(f"  {error}")
-    return 0 if whole else 1
+    return 0 if is_intact else 1

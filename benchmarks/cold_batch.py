@@ -39,16 +39,18 @@ def measure(times: int) -> list[Measurement]:
         course = Path(folder)
         _create_course(course)
         _measure_cold_batch()
-        ours, theirs = zip(*((_measure_cold_batch(), _autograde(course)) for _ in range(count)), strict=True)
+        robomark_seconds, nbgrader_seconds = zip(
+            *((_measure_cold_batch(), _autograde(course)) for _ in range(count)), strict=True
+        )
     return [
-        Measurement(_WHAT, median(ours), SECONDS),
+        Measurement(_WHAT, median(robomark_seconds), SECONDS),
         Measurement(
             f"{_WHAT} against nbgrader's ten notebooks",
-            median(ours) / median(theirs),
+            median(robomark_seconds) / median(nbgrader_seconds),
             RATIO,
             1 / 3,
             1 / 6,
-            details=f"{median(ours):.1f} s against {median(theirs):.1f} s",
+            details=f"{median(robomark_seconds):.1f} s against {median(nbgrader_seconds):.1f} s",
         ),
     ]
 
@@ -57,10 +59,10 @@ def _measure_cold_batch() -> float:
     with tempfile.TemporaryDirectory() as folder:
         home, batch, reports = (Path(folder) / name for name in ("home", "batch", "reports"))
         for number in range(_SUBMISSIONS):
-            own = batch / f"student{number}"
-            shutil.copytree(locate_examples(_ASSIGNMENT) / REFERENCE, own)
+            submission = batch / f"student{number}"
+            shutil.copytree(locate_examples(_ASSIGNMENT) / REFERENCE, submission)
             # Each text differs, because identical submissions are graded only once.
-            (own / "robot.py").write_text(f"# {number}\n" + (own / "robot.py").read_text())
+            (submission / "robot.py").write_text(f"# {number}\n" + (submission / "robot.py").read_text())
         command = [*ROBOMARK, "batch", "submit", str(batch), "-a", _ASSIGNMENT, "--output", str(reports)]
         environment = build_user_environment() | {"ROBOMARK_HOME": str(home)}
         return measure_wall_seconds(lambda: subprocess.run(command, env=environment, check=True, capture_output=True))
@@ -104,6 +106,8 @@ def _run_nbgrader(course: Path, *words: str) -> None:
     # nbgrader calls programs from its own environment.
     path = f"{Path(NBGRADER).parent}{os.pathsep}{os.environ['PATH']}"
     environment = os.environ | {"PATH": path}
-    ended = subprocess.run([NBGRADER, *words], cwd=course, env=environment, capture_output=True, text=True, check=False)
-    if ended.returncode:
-        raise RuntimeError(f"nbgrader {' '.join(words)} ends with {ended.returncode}: {ended.stderr[-1000:]}")
+    result = subprocess.run(
+        [NBGRADER, *words], cwd=course, env=environment, capture_output=True, text=True, check=False
+    )
+    if result.returncode:
+        raise RuntimeError(f"nbgrader {' '.join(words)} ends with {result.returncode}: {result.stderr[-1000:]}")

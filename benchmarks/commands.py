@@ -23,40 +23,40 @@ def measure(times: int) -> list[Measurement]:
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         with open_store(load_settings(home=home)) as store:
-            stored = create_graded_batch(store)
-        return [_compare_with_import(imports, name, of, home, times) for imports, name, of in _list_commands(stored)]
+            batch = create_graded_batch(store)
+        return [_compare_with_import(imports, name, of, home, times) for imports, name, of in _list_commands(batch)]
 
 
-def _list_commands(stored: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]:
+def _list_commands(batch: GradedBatch) -> Sequence[tuple[str, str, tuple[str, ...]]]:
     """Return the baseline, the command and the table row of each measurement."""
     return (
         (_BARE, "--help", ()),
         (_BARE, "--version", ()),
         (_BARE, "assignments list", ()),
         (_WITH_DATABASE, "batch list", ()),
-        (_WITH_DATABASE, "batch status", (stored.batch,)),
-        (_WITH_DATABASE, "show", (stored.job,)),
+        (_WITH_DATABASE, "batch status", (batch.batch,)),
+        (_WITH_DATABASE, "show", (batch.job,)),
         (_WITH_DATABASE, "course policy", ()),
     )
 
 
-def _compare_with_import(imports: str, name: str, of: tuple[str, ...], home: Path, times: int) -> Measurement:
+def _compare_with_import(imports: str, name: str, arguments: tuple[str, ...], home: Path, times: int) -> Measurement:
     environment = {"ROBOMARK_HOME": str(home)}
     # The first run compiles bytecode.
-    measure_command_cpu((*ROBOMARK, *name.split(), *of), environment)
+    measure_command_cpu((*ROBOMARK, *name.split(), *arguments), environment)
     seconds = [
         (
-            measure_command_cpu((*ROBOMARK, *name.split(), *of), environment),
+            measure_command_cpu((*ROBOMARK, *name.split(), *arguments), environment),
             measure_command_cpu((sys.executable, "-c", f"import {imports}"), environment),
         )
         for _ in range(times)
     ]
-    asked, imported = (median(each) for each in zip(*seconds, strict=True))
+    command_seconds, import_seconds = (median(each) for each in zip(*seconds, strict=True))
     return Measurement(
         f"robomark {name}, CPU against import {imports}",
-        asked / imported,
+        command_seconds / import_seconds,
         RATIO,
         budget=3 if imports == _BARE else 2,
         beyond=1.5,
-        details=f"{asked:.2f} s against {imported:.2f} s",
+        details=f"{command_seconds:.2f} s against {import_seconds:.2f} s",
     )

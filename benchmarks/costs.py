@@ -55,9 +55,9 @@ class Costs:
 
     def measure_part(self, part: str, work: Callable[[], Made]) -> Made:
         start = time.process_time()
-        made = work()
+        result = work()
         self.take(part, time.process_time() - start)
-        return made
+        return result
 
     def sum_medians(self, *parts: str) -> float:
         """Return the sum of the parts' medians."""
@@ -74,46 +74,49 @@ def main(_arguments: list[str]) -> int:
     print(f"a loop of ten million additions: {measure_loop(5):.2f} s")
     _show("One trial, a line follower of 60 s", measure_trial())
     costs = measure_submission()
-    once = {part: costs.sum_medians(part) for part in costs.parts if part not in STARTS}
-    _show("One short submission, warm, from its files to a report", once)
-    cold = {part: costs.sum_medians(part) for part in STARTS}
-    _show("Ten of them, cold", cold | {part: 10 * seconds for part, seconds in once.items()})
+    warm_costs = {part: costs.sum_medians(part) for part in costs.parts if part not in STARTS}
+    _show("One short submission, warm, from its files to a report", warm_costs)
+    start_costs = {part: costs.sum_medians(part) for part in STARTS}
+    _show("Ten of them, cold", start_costs | {part: 10 * seconds for part, seconds in warm_costs.items()})
     return 0
 
 
 def measure_trial() -> Mapping[str, float]:
     """Return the CPU seconds of each of our modules in the worker, including library calls."""
-    wanted = build_spec(FOLLOWER)
+    spec = build_spec(FOLLOWER)
     with TrialRunner() as runner:
-        runner.run(wanted)
-        plain, children = [], []
+        runner.run(spec)
+        worker_seconds, children_seconds = [], []
         for _ in range(_TIMES):
-            before, start = runner.children_cpu_seconds, time.process_time()
-            runner.run(wanted)
-            plain.append(time.process_time() - start)
-            children.append(runner.children_cpu_seconds - before)
+            children_before, start = runner.children_cpu_seconds, time.process_time()
+            runner.run(spec)
+            worker_seconds.append(time.process_time() - start)
+            children_seconds.append(runner.children_cpu_seconds - children_before)
         profile = cProfile.Profile(time.process_time)
-        profile.runcall(runner.run, wanted)
+        profile.runcall(runner.run, spec)
     shares = _sum_by_module(profile)
-    worker = median(plain)
+    worker = median(worker_seconds)
     # Profiling slows everything, so only the shares are used.
     rows = {f"worker: {name}": worker * share for name, share in shares[:_ROOMS]}
-    rest = sum(share for _, share in shares[_ROOMS:])
-    return rows | {"worker: all other modules": worker * rest, "program and responder, two children": median(children)}
+    remainder = sum(share for _, share in shares[_ROOMS:])
+    return rows | {
+        "worker: all other modules": worker * remainder,
+        "program and responder, two children": median(children_seconds),
+    }
 
 
 def _sum_by_module(profile: cProfile.Profile) -> list[tuple[str, float]]:
     """Return each of our modules with its share, the largest first. Built-in functions count for their caller."""
     seconds: Counter[str] = Counter()
-    for (file, _, _), (_, _, own, _, callers) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
+    for (file, _, _), (_, _, own_seconds, _, callers) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
         name = _find_module(file)
         if name is not None or not callers:
-            seconds[name or "Python itself"] += own
+            seconds[name or "Python itself"] += own_seconds
             continue
         for (caller, _, _), (_, _, share, _) in callers.items():
             seconds[_find_module(caller) or "Python itself"] += share
-    whole = sum(seconds.values())
-    return [(name, value / whole) for name, value in seconds.most_common()]
+    total = sum(seconds.values())
+    return [(name, value / total) for name, value in seconds.most_common()]
 
 
 def _find_module(file: str) -> str | None:
@@ -138,49 +141,51 @@ def measure_submission() -> Costs:
 
 
 def _measure_one(store: Store, runner: TrialRunner, student: str, costs: Costs) -> None:
-    asked = build_short_request(student)
-    costs.measure_part(TAKEN_IN, lambda: intake.accept_submission(store, asked, max_attempts=3))
+    request = build_short_request(student)
+    costs.measure_part(TAKEN_IN, lambda: intake.accept_submission(store, request, max_attempts=3))
     claim = costs.measure_part(CLAIMED, lambda: jobs.claim_job(store, "worker", 60))
     assert claim is not None
-    graded = _grade_in_parts(asked, runner, costs)
-    prepared = costs.measure_part("packing the recordings", lambda: results.prepare_grade(graded))
+    student_grade = _grade_in_parts(request, runner, costs)
+    prepared = costs.measure_part("packing the recordings", lambda: results.prepare_grade(student_grade))
     costs.measure_part(STORED, lambda: jobs.finish_job(store, claim, prepared, datetime.now(UTC)))
-    drawn = costs.measure_part(DRAWN, lambda: draw_plots(graded, asked.assignment, asked.submission))
-    costs.measure_part("the report", lambda: render_report_page(build_student_view(graded), drawn, asked.submission))
+    plots = costs.measure_part(DRAWN, lambda: draw_plots(student_grade, request.assignment, request.submission))
+    costs.measure_part(
+        "the report", lambda: render_report_page(build_student_view(student_grade), plots, request.submission)
+    )
 
 
-def _grade_in_parts(asked: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
+def _grade_in_parts(request: GradingRequest, runner: TrialRunner, costs: Costs) -> Grade:
     """Return the grade. Trials and judging are separated at the end of the last trial."""
     moments: list[float] = []
 
     def observe(_progress: GradingProgress) -> None:
         moments.append(time.process_time())
 
-    before, start = runner.children_cpu_seconds, time.process_time()
-    graded = grade(asked.submission, asked.assignment, observe=observe, runner=runner)
+    children_before, start = runner.children_cpu_seconds, time.process_time()
+    student_grade = grade(request.submission, request.assignment, observe=observe, runner=runner)
     end = time.process_time()
     trials, judging, children = _GRADING
     costs.take(trials, moments[-1] - start)
     costs.take(judging, end - moments[-1])
-    costs.take(children, runner.children_cpu_seconds - before)
-    return graded
+    costs.take(children, runner.children_cpu_seconds - children_before)
+    return student_grade
 
 
 def _measure_cold_grading() -> float:
     """Return the CPU seconds of a grading that starts its own processes, including those processes."""
-    before = os.times()
-    asked = build_short_request("cold")
-    grade(asked.submission, asked.assignment)
-    after = os.times()
-    return sum(after[:4]) - sum(before[:4])
+    times_before = os.times()
+    request = build_short_request("cold")
+    grade(request.submission, request.assignment)
+    times_after = os.times()
+    return sum(times_after[:4]) - sum(times_before[:4])
 
 
 def _show(title: str, parts: Mapping[str, float]) -> None:
-    whole = sum(parts.values())
-    table = Table(title=f"{title}: {whole:.3f} s", box=None, title_justify="left")
+    total = sum(parts.values())
+    table = Table(title=f"{title}: {total:.3f} s", box=None, title_justify="left")
     table.add_column("part")
     for heading in ("CPU", "share"):
         table.add_column(heading, justify="right")
     for part, seconds in sorted(parts.items(), key=lambda item: -item[1]):
-        table.add_row(part, f"{1000 * seconds:.1f} ms", f"{seconds / whole:.0%}")
+        table.add_row(part, f"{1000 * seconds:.1f} ms", f"{seconds / total:.0%}")
     Console(width=120).print(table)

@@ -46,11 +46,11 @@ class GradedBatch:
 
 def create_graded_batch(store: Store) -> GradedBatch:
     """Add a batch of one submission, grade it, and store its grade, without a queue."""
-    accepted = intake.accept_batch(store, "one", [build_short_request("ada")], [], max_attempts=3)
+    batch = intake.accept_batch(store, "one", [build_short_request("ada")], [], max_attempts=3)
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     with store.reading() as session:
-        asked = intake.load_grading_request(session, claim.job_id)
-    graded = grade(asked.submission, asked.assignment)
-    jobs.finish_job(store, claim, results.prepare_grade(graded), datetime.now(UTC))
-    return GradedBatch(accepted.id, claim.job_id)
+        request = intake.load_grading_request(session, claim.job_id)
+    student_grade = grade(request.submission, request.assignment)
+    jobs.finish_job(store, claim, results.prepare_grade(student_grade), datetime.now(UTC))
+    return GradedBatch(batch.id, claim.job_id)

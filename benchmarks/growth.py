@@ -29,8 +29,8 @@ def measure(times: int) -> list[Measurement]:
     """Measure the growth, with the cost per item in the last step."""
     with TrialRunner() as runner, tempfile.TemporaryDirectory() as home:
 
-        def trial(wanted: TrialSpec) -> float:
-            return measure_through_processes(runner, wanted)
+        def trial(spec: TrialSpec) -> float:
+            return measure_through_processes(runner, spec)
 
         def length(seconds: int) -> float:
             return trial(replace(build_spec(FOLLOWER), seconds=seconds))
@@ -44,8 +44,8 @@ def measure(times: int) -> list[Measurement]:
         with open_store(load_settings(home=Path(home))) as store:
 
             def batch(submissions: int) -> float:
-                asked = [build_short_request(f"student {number}") for number in range(submissions)]
-                return measure_cpu_seconds(lambda: intake.accept_batch(store, "batch", asked, [], max_attempts=3))
+                requests = [build_short_request(f"student {number}") for number in range(submissions)]
+                return measure_cpu_seconds(lambda: intake.accept_batch(store, "batch", requests, [], max_attempts=3))
 
             return [
                 _measure_growth("a simulated second of a line follower, 15 to 60 to 240", length, 15, times),
@@ -55,13 +55,17 @@ def measure(times: int) -> list[Measurement]:
             ]
 
 
-def _measure_growth(what: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
+def _measure_growth(title: str, cost: Callable[[int], float], smallest: int, times: int) -> Measurement:
     # The minimum of each, because other load only adds to it.
     small, medium, large = (
         min(cost(size) for _ in range(min(times, 3) + 1)) for size in (smallest, 4 * smallest, 16 * smallest)
     )
-    piece = (large - medium) / (12 * smallest)
-    before = (medium - small) / (3 * smallest)
+    late_cost = (large - medium) / (12 * smallest)
+    early_cost = (medium - small) / (3 * smallest)
     return Measurement(
-        f"growth: {what}", piece / before, RATIO, _LARGEST_RATIO, details=f"{1000 * piece:.2f} ms of CPU each"
+        f"growth: {title}",
+        late_cost / early_cost,
+        RATIO,
+        _LARGEST_RATIO,
+        details=f"{1000 * late_cost:.2f} ms of CPU each",
     )

@@ -52,40 +52,55 @@ def fill(store: Store, image_of: GradedBatch) -> None:
         student, number = _select_numbers(STUDENTS), _select_numbers(GRADES)
         job = session.get_one(Job, image_of.job)
         enrolment = session.get_one(Enrolment, job.enrolment_id)
-        who = _FIRST + student.c.number
-        named = _build_text("student", student.c.number)
-        _copy(session, Person, enrolment.person_id, student, {"id": who})
-        enrolled = {"id": who, "person_id": who, "student": named, "written": named, "name": named}
-        _copy(session, Enrolment, enrolment.id, student, enrolled)
+        person_id = _FIRST + student.c.number
+        student_name = _build_text("student", student.c.number)
+        _copy(session, Person, enrolment.person_id, student, {"id": person_id})
+        enrolment_changes = {
+            "id": person_id,
+            "person_id": person_id,
+            "student": student_name,
+            "written": student_name,
+            "name": student_name,
+        }
+        _copy(session, Enrolment, enrolment.id, student, enrolment_changes)
         batches = _select_numbers(BATCHES)
         _copy(session, Batch, image_of.batch, batches, {"id": _build_text("b", _WIDE + batches.c.number)})
-        which = number.c.number
-        of = {
-            "enrolment_id": _FIRST + which % STUDENTS,
-            "batch_id": _build_text("b", _WIDE + _divide(which, STUDENTS)),
+        grade_number = number.c.number
+        parent_keys = {
+            "enrolment_id": _FIRST + grade_number % STUDENTS,
+            "batch_id": _build_text("b", _WIDE + _divide(grade_number, STUDENTS)),
         }
-        submitted = {"id": _FIRST + which, "attempt": _divide(which, STUDENTS) + 1, "sha256": _build_text("s", which)}
-        _copy(session, SubmissionRow, job.submission_id, number, of | submitted)
+        submission_changes = {
+            "id": _FIRST + grade_number,
+            "attempt": _divide(grade_number, STUDENTS) + 1,
+            "sha256": _build_text("s", grade_number),
+        }
+        _copy(session, SubmissionRow, job.submission_id, number, parent_keys | submission_changes)
         long_ago = literal(datetime.now(UTC) - timedelta(days=2), UtcDateTime())
-        graded = {
-            "id": _build_text("j", _WIDE + which),
-            "submission_id": _FIRST + which,
-            "cache_key": _build_text("c", which),
+        job_changes = {
+            "id": _build_text("j", _WIDE + grade_number),
+            "submission_id": _FIRST + grade_number,
+            "cache_key": _build_text("c", grade_number),
         }
         moments = dict.fromkeys(("queued_at", "due_at", "started_at", "graded_at", "finished_at"), long_ago)
-        _copy(session, Job, image_of.job, number, of | graded | moments)
+        _copy(session, Job, image_of.job, number, parent_keys | job_changes | moments)
         _copy_job_rows(session, TrialRow, image_of.job, number)
         _copy_job_rows(session, CriterionResultRow, image_of.job, number)
         _requeue_last_batches(session)
 
 
 def _requeue_last_batches(session: Session) -> None:
-    waiting = [format_batch_name(number) for number in range(BATCHES - WAITING_BATCHES, BATCHES)]
-    graded = ("verdict", "marks", "max_marks", "cache_key", "started_at", "graded_at", "finished_at", "worker")
-    nothing = dict.fromkeys(graded) | {"attempt": 0, "progress": 0.0, "plots": "none", "plots_due_at": None}
-    session.execute(update(Job).where(Job.batch_id.in_(waiting)).values(state=JobState.QUEUED, **nothing))
-    recent = [format_grade_name(number) for number in range(RECENT)]
-    session.execute(update(Job).where(Job.id.in_(recent)).values(started_at=datetime.now(UTC)))
+    batch_ids = [format_batch_name(number) for number in range(BATCHES - WAITING_BATCHES, BATCHES)]
+    graded_columns = ("verdict", "marks", "max_marks", "cache_key", "started_at", "graded_at", "finished_at", "worker")
+    cleared_values = dict.fromkeys(graded_columns) | {
+        "attempt": 0,
+        "progress": 0.0,
+        "plots": "none",
+        "plots_due_at": None,
+    }
+    session.execute(update(Job).where(Job.batch_id.in_(batch_ids)).values(state=JobState.QUEUED, **cleared_values))
+    recent_ids = [format_grade_name(number) for number in range(RECENT)]
+    session.execute(update(Job).where(Job.id.in_(recent_ids)).values(started_at=datetime.now(UTC)))
 
 
 def _select_numbers(count: int) -> Any:
@@ -97,18 +112,18 @@ def _select_numbers(count: int) -> Any:
 def _copy(session: Session, kind: type[Base], image_of: Any, numbers: FromClause, changes: Changes) -> None:
     """Insert a copy of one row for each number, with the columns that depend on the number."""
     table = kind.__table__
-    chosen = [changes.get(column.name, column).label(column.name) for column in table.columns]
-    rows = select(*chosen).select_from(numbers.join(table, table.c.id == image_of))
+    selected_columns = [changes.get(column.name, column).label(column.name) for column in table.columns]
+    rows = select(*selected_columns).select_from(numbers.join(table, table.c.id == image_of))
     session.execute(insert(kind).from_select([column.name for column in table.columns], rows, include_defaults=False))
 
 
 def _copy_job_rows(session: Session, kind: type[Base], image_of: str, numbers: FromClause) -> None:
     """Insert copies of all rows of one job for each number."""
     table = kind.__table__
-    which = numbers.c.number
-    own = {"id": _FIRST + which * 100 + table.c.position, "job_id": _build_text("j", _WIDE + which)}
-    chosen = [own.get(column.name, column).label(column.name) for column in table.columns]
-    rows = select(*chosen).select_from(numbers.join(table, table.c.job_id == image_of))
+    job_number = numbers.c.number
+    changes = {"id": _FIRST + job_number * 100 + table.c.position, "job_id": _build_text("j", _WIDE + job_number)}
+    selected_columns = [changes.get(column.name, column).label(column.name) for column in table.columns]
+    rows = select(*selected_columns).select_from(numbers.join(table, table.c.job_id == image_of))
     session.execute(insert(kind).from_select([column.name for column in table.columns], rows, include_defaults=False))
 
 

@@ -100,10 +100,10 @@ def measure_command_cpu(command: Sequence[str], environment: dict[str, str]) -> 
         text=True,
     )
     assert process.stderr is not None
-    said = process.stderr.read()
-    _, status, used = os.wait4(process.pid, 0)
+    errors = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     process.stderr.close()
     if process.returncode:
-        raise RuntimeError(f"{' '.join(command)} ends with {process.returncode}: {said}")
-    return used.ru_utime + used.ru_stime
+        raise RuntimeError(f"{' '.join(command)} ends with {process.returncode}: {errors}")
+    return usage.ru_utime + usage.ru_stime

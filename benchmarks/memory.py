@@ -48,12 +48,16 @@ def measure(_times: int) -> list[Measurement]:
     """Measure the memory, in about a minute."""
     command = [sys.executable, "-c", _WORKER, str(_WARM), str(_TRIALS)]
     try:
-        held, before, after = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        total, initial, final = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     except subprocess.CalledProcessError as error:
         raise RuntimeError(f"the worker ends with {error.returncode}: {error.stderr}") from None
     return [
-        Measurement("memory of a worker and of what it forks from", held, MEGABYTES, 400),
+        Measurement("memory of a worker and of what it forks from", total, MEGABYTES, 400),
         Measurement(
-            f"its growth in {_TRIALS} trials", after - before, MEGABYTES, 1, details=f"from {before:.1f} MB of its own"
+            f"its growth in {_TRIALS} trials",
+            final - initial,
+            MEGABYTES,
+            1,
+            details=f"from {initial:.1f} MB of its own",
         ),
     ]

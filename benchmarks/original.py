@@ -48,9 +48,9 @@ def _follow(left: _Wheel, right: _Wheel, red: float, clock: int) -> None:
 def _drive_square(left: _Wheel, right: _Wheel, _red: float, clock: int) -> None:
     """Drive a square: two seconds ahead, two on the spot, to positions."""
     if clock % 60 == 0:
-        ahead = clock % 120 == 0
+        is_straight = clock % 120 == 0
         left.speed_sp = right.speed_sp = 315
-        left.position_sp, right.position_sp = (1080, 1080) if ahead else (-576, 576)
+        left.position_sp, right.position_sp = (1080, 1080) if is_straight else (-576, 576)
         left.run("run-to-rel-pos", clock)
         right.run("run-to-rel-pos", clock)
 
@@ -84,26 +84,32 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _compare_speed(
-    name: str, theirs: Callable[[], OriginalSimulator], ours: Callable[[], World], noise: Noise, times: int
+    name: str,
+    original_factory: Callable[[], OriginalSimulator],
+    world_factory: Callable[[], World],
+    noise: Noise,
+    times: int,
 ) -> Measurement:
     if noise.light == 0:
-        _compare(name, theirs(), ours())
-    port, own = (measure_median(min(times, 3), partial(measure_cpu_seconds, run)) for run in (theirs, ours))
+        _compare(name, original_factory(), world_factory())
+    port_seconds, own_seconds = (
+        measure_median(min(times, 3), partial(measure_cpu_seconds, run)) for run in (original_factory, world_factory)
+    )
     seconds = _TICKS / 30
     return Measurement(
         f"the original's loop in plain Python against ours, {name}",
-        port / own,
+        port_seconds / own_seconds,
         GAIN,
-        details=f"{seconds / port:.0f}x and {seconds / own:.0f}x real time",
+        details=f"{seconds / port_seconds:.0f}x and {seconds / own_seconds:.0f}x real time",
     )
 
 
-def _compare(name: str, port: OriginalSimulator, own: World) -> None:
-    drive = own.drive
-    place = (port.x - drive.x, port.y - drive.y, math.degrees(port.angle - drive.heading))
-    apart = (*place, port.ultrasonic - own.ultrasonic, port.left_red - own.left_means[0])
-    if max(map(abs, apart)) > _NEAR:
-        raise RuntimeError(f"the port and ours do not end alike with {name}: {apart}")
+def _compare(name: str, port: OriginalSimulator, world: World) -> None:
+    drive = world.drive
+    pose_error = (port.x - drive.x, port.y - drive.y, math.degrees(port.angle - drive.heading))
+    differences = (*pose_error, port.ultrasonic - world.ultrasonic, port.left_red - world.left_means[0])
+    if max(map(abs, differences)) > _NEAR:
+        raise RuntimeError(f"the port and ours do not end alike with {name}: {differences}")
 
 
 def _run_original(canvas: bytes, program: _Program, noise: Noise) -> OriginalSimulator:

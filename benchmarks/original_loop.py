@@ -108,14 +108,14 @@ class OriginalSimulator:
         self.left.set_speed(self.wheel_noise)
         self.right.set_speed(self.wheel_noise)
         left, right = self.left.distance(), self.right.distance()
-        way = (left + right) / 2
-        self.x += way * math.cos(self.angle)
-        self.y += way * math.sin(self.angle)
-        turned = (right - left) / _SPACING
-        self.angle += turned
+        distance = (left + right) / 2
+        self.x += distance * math.cos(self.angle)
+        self.y += distance * math.sin(self.angle)
+        rotation = (right - left) / _SPACING
+        self.angle += rotation
         if self.angle > 2 * math.pi:
             self.angle -= 2 * math.pi
-        degrees = math.degrees(turned)
+        degrees = math.degrees(rotation)
         self.gyro[0] -= degrees
         self.gyro[1] = -degrees * FPS
         if self.clock % 3 == 0:
@@ -124,20 +124,20 @@ class OriginalSimulator:
 
     def _read_light_sensors(self) -> None:
         cosine, sine = math.cos(self.angle - math.pi / 2), math.sin(self.angle - math.pi / 2)
-        seen = []
+        readings = []
         for across, ahead in _SENSORS:
             column = int(cosine * across - sine * ahead + self.x - _RADIUS)
             row = int(-(sine * across + cosine * ahead) + (HEIGHT - self.y) - _RADIUS)
-            seen.append(self._read_light_sensor(column, row))
-        self.means = [means for means, _ in seen]
-        self.texts = [text for _, text in seen]
+            readings.append(self._read_light_sensor(column, row))
+        self.means = [means for means, _ in readings]
+        self.texts = [text for _, text in readings]
 
     def _read_light_sensor(self, column: int, row: int) -> tuple[tuple[float, float, float], str]:
         """Return the means, and the comma-separated values of all pixels, of one window of the canvas."""
         if 0 <= column <= WIDTH - _SIDE and 0 <= row <= HEIGHT - _SIDE:
             pixels, stride = self.pixels, 4 * WIDTH
-            begin = row * stride + 4 * column
-            window = b"".join(pixels[begin + stride * k : begin + stride * k + 4 * _SIDE] for k in range(_SIDE))
+            start = row * stride + 4 * column
+            window = b"".join(pixels[start + stride * k : start + stride * k + 4 * _SIDE] for k in range(_SIDE))
         else:
             window = self._copy_partial_window(column, row)
         noise = self.sensor_noise
@@ -165,8 +165,8 @@ class OriginalSimulator:
         for k in range(_SIDE * _SIDE):
             x, y = column + k % _SIDE, row + k // _SIDE
             if 0 <= x < WIDTH and 0 <= y < HEIGHT:
-                begin = 4 * (y * WIDTH + x)
-                window[4 * k : 4 * k + 4] = self.pixels[begin : begin + 4]
+                start = 4 * (y * WIDTH + x)
+                window[4 * k : 4 * k + 4] = self.pixels[start : start + 4]
         return bytes(window)
 
     def _read_sonar(self) -> None:
@@ -174,8 +174,8 @@ class OriginalSimulator:
         x, y = self.x + 20 * math.cos(self.angle), self.y + 20 * math.sin(self.angle)
         nearest = float(_REACH)
         for ray in _RAYS:
-            towards = math.radians(heading + ray)
-            end_x, end_y = x + _REACH * math.cos(towards), y + _REACH * math.sin(towards)
+            direction = math.radians(heading + ray)
+            end_x, end_y = x + _REACH * math.cos(direction), y + _REACH * math.sin(direction)
             for wall in _WALLS:
                 distance = _find_hit_distance(x, y, end_x, end_y, wall)
                 if distance is not None and distance < nearest and _is_detectable(heading, wall[4]):
@@ -195,13 +195,13 @@ def _find_hit_distance(
 ) -> float | None:
     """Return the distance of the wall along the ray, or None if the ray misses it."""
     x3, y3, x4, y4, _ = wall
-    below = (x - end_x) * (y3 - y4) - (y - end_y) * (x3 - x4)
-    if below == 0:
+    denominator = (x - end_x) * (y3 - y4) - (y - end_y) * (x3 - x4)
+    if denominator == 0:
         return None
     ray, edge = x * end_y - y * end_x, x3 * y4 - y3 * x4
-    at_x = (ray * (x3 - x4) - (x - end_x) * edge) / below
-    at_y = (ray * (y3 - y4) - (y - end_y) * edge) / below
-    for at, one, other in ((at_x, x, end_x), (at_y, y, end_y), (at_x, x3, x4), (at_y, y3, y4)):
-        if not min(one, other) - 0.01 <= at <= max(one, other) + 0.01:
+    at_x = (ray * (x3 - x4) - (x - end_x) * edge) / denominator
+    at_y = (ray * (y3 - y4) - (y - end_y) * edge) / denominator
+    for coordinate, start, end in ((at_x, x, end_x), (at_y, y, end_y), (at_x, x3, x4), (at_y, y3, y4)):
+        if not min(start, end) - 0.01 <= coordinate <= max(start, end) + 0.01:
             return None
     return math.hypot(at_x - x, at_y - y)

@@ -42,52 +42,54 @@ def measure(times: int) -> list[Measurement]:
 
 def _build_request(name: str) -> GradingRequest:
     assignment = find_assignment(name)
-    submission = read_submission(locate_examples(name) / REFERENCE, asked=assignment.parts)
+    submission = read_submission(locate_examples(name) / REFERENCE, required_parts=assignment.parts)
     return GradingRequest(submission, assignment, name)
 
 
 def _compare_with_marking(name: str, runner: TrialRunner, times: int) -> Measurement:
-    asked = _build_request(name)
-    graded = _grade_request(asked, runner)
-    plots = draw_plots(graded, asked.assignment, asked.submission)
-    marking = [_measure_marking(asked, runner) for _ in range(times)]
-    drawing = [
-        measure_cpu_seconds(partial(draw_plots, graded, asked.assignment, asked.submission)) for _ in range(times)
+    request = _build_request(name)
+    student_grade = _grade_request(request, runner)
+    plots = draw_plots(student_grade, request.assignment, request.submission)
+    marking_seconds = [_measure_marking(request, runner) for _ in range(times)]
+    drawing_seconds = [
+        measure_cpu_seconds(partial(draw_plots, student_grade, request.assignment, request.submission))
+        for _ in range(times)
     ]
     return Measurement(
         f"plots of {name}, CPU against marking it",
-        median(drawing) / median(marking),
+        median(drawing_seconds) / median(marking_seconds),
         RATIO,
         1,
         0.3,
-        f"{median(drawing):.2f} s against {median(marking):.2f} s; {len(plots)} plots, {len(graded.trials)} trials",
+        f"{median(drawing_seconds):.2f} s against {median(marking_seconds):.2f} s; {len(plots)} plots, "
+        f"{len(student_grade.trials)} trials",
     )
 
 
-def _grade_request(asked: GradingRequest, runner: TrialRunner) -> Grade:
-    return grade(asked.submission, asked.assignment, runner=runner)
+def _grade_request(request: GradingRequest, runner: TrialRunner) -> Grade:
+    return grade(request.submission, request.assignment, runner=runner)
 
 
-def _measure_marking(asked: GradingRequest, runner: TrialRunner) -> float:
+def _measure_marking(request: GradingRequest, runner: TrialRunner) -> float:
     """Return the CPU seconds of the worker and of the students' processes."""
-    before = runner.children_cpu_seconds
-    own = measure_cpu_seconds(lambda: _grade_request(asked, runner))
-    return own + runner.children_cpu_seconds - before
+    children_before = runner.children_cpu_seconds
+    worker_seconds = measure_cpu_seconds(lambda: _grade_request(request, runner))
+    return worker_seconds + runner.children_cpu_seconds - children_before
 
 
-def _measure_report(asked: GradingRequest, runner: TrialRunner, times: int) -> list[Measurement]:
-    graded = _grade_request(asked, runner)
-    drawn = draw_plots(graded, asked.assignment, asked.submission)
-    page = partial(render_report_page, build_student_view(graded), drawn, asked.submission)
+def _measure_report(request: GradingRequest, runner: TrialRunner, times: int) -> list[Measurement]:
+    student_grade = _grade_request(request, runner)
+    plots = draw_plots(student_grade, request.assignment, request.submission)
+    page = partial(render_report_page, build_student_view(student_grade), plots, request.submission)
     size = len(_warm_up(page).encode())
     seconds = median([measure_wall_seconds(page) for _ in range(times)])
-    trials = f"{len(graded.trials)} trials of at most 60 s"
+    trials = f"{len(student_grade.trials)} trials of at most 60 s"
     return [
         Measurement("report with a replay of 60 s", size / 1e6, MEGABYTES, 1, 0.4, trials),
         Measurement("the same, until it is ready", seconds, SECONDS, 1),
     ]
 
 
-def _warm_up(made: Callable[[], Made]) -> Made:
-    made()
-    return made()
+def _warm_up(build: Callable[[], Made]) -> Made:
+    build()
+    return build()

@@ -30,11 +30,11 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 def measure(times: int) -> list[Measurement]:
     """Measure two workers in turn, in a new home for each repetition."""
-    asked, spared = zip(*(_measure_two_workers() for _ in range(times)), strict=True)
-    what = "a worker's start until it claims, all its processes, CPU"
+    asked_seconds, cached_seconds = zip(*(_measure_two_workers() for _ in range(times)), strict=True)
+    title = "a worker's start until it claims, all its processes, CPU"
     return [
-        Measurement(f"{what}, known answer cached", median(spared), SECONDS, 2),
-        Measurement(f"{what}, asked for the known answer", median(asked), SECONDS, 5),
+        Measurement(f"{title}, known answer cached", median(cached_seconds), SECONDS, 2),
+        Measurement(f"{title}, asked for the known answer", median(asked_seconds), SECONDS, 5),
     ]
 
 
@@ -52,11 +52,11 @@ def _measure_cpu_until_claim(store: Store, notifier: Notifier, student: str) -> 
     job = intake.accept_submission(store, build_short_request(student), max_attempts=3).job_id
     notifier.grade(JobQueue.INTERACTIVE)
     worker = SupervisedWorker(notifier.settings, store, notifier.settings.home / "log" / "worker.log")
-    until = time.monotonic() + _PATIENCE
+    deadline = time.monotonic() + _PATIENCE
     worker.ensure()
     try:
         while not _is_claimed(store, job):
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 raise RuntimeError("the worker claims nothing")
             time.sleep(_LOOK_SECONDS)
         assert worker.process.pid is not None
@@ -73,7 +73,7 @@ def _is_claimed(store: Store, job: str) -> bool:
 def _read_cpu_seconds(pid: int) -> float:
     """Return the CPU seconds of the process and of its ended children."""
     try:
-        words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        stat_fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
         return 0.0
-    return sum(map(int, words[11:15])) / _TICKS
+    return sum(map(int, stat_fields[11:15])) / _TICKS

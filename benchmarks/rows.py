@@ -93,9 +93,9 @@ def measure(times: int) -> list[Measurement]:
 
 def _measure_query(database: str, store: Store, question: _TimedQuery, times: int) -> Measurement:
     seconds = _time_query(question.ask, store, times)
-    what = f"{many_rows.GRADES:,} grades, {database}: {question.name}"
-    told = f"most {1000 * max(seconds):.1f} ms"
-    return Measurement(what, 1000 * median(seconds), MILLISECONDS, question.milliseconds, details=told)
+    title = f"{many_rows.GRADES:,} grades, {database}: {question.name}"
+    details = f"most {1000 * max(seconds):.1f} ms"
+    return Measurement(title, 1000 * median(seconds), MILLISECONDS, question.milliseconds, details=details)
 
 
 def measure_claim() -> float:
@@ -134,22 +134,22 @@ def _fill_databases() -> Iterator[tuple[str, Store]]:
 
 def _collect_plans(store: Store, question: _TimedQuery) -> list[str]:
     """Return the plan of each statement of a query."""
-    asked: dict[str, Any] = {}
+    statements: dict[str, Any] = {}
 
-    def note(_connection: object, _cursor: object, statement: str, parameters: Any, *_: object) -> None:
+    def record_statement(_connection: object, _cursor: object, statement: str, parameters: Any, *_: object) -> None:
         if statement.startswith(("SELECT", "WITH")) and "FROM" in statement:
-            asked.setdefault(statement, parameters)
+            statements.setdefault(statement, parameters)
 
-    event.listen(store.engine, "before_cursor_execute", note)
+    event.listen(store.engine, "before_cursor_execute", record_statement)
     try:
         question.ask(store)
     finally:
-        event.remove(store.engine, "before_cursor_execute", note)
+        event.remove(store.engine, "before_cursor_execute", record_statement)
     with store.engine.connect() as connection:
         sqlite = connection.dialect.name == "sqlite"
         explain = "EXPLAIN QUERY PLAN " if sqlite else "EXPLAIN (ANALYZE, COSTS OFF, TIMING OFF, SUMMARY OFF) "
         plans = []
-        for statement, parameters in asked.items():
-            found = connection.exec_driver_sql(explain + statement, parameters).all()
-            plans.append("\n".join("  " + str(row[-1]) for row in found))
+        for statement, parameters in statements.items():
+            plan_rows = connection.exec_driver_sql(explain + statement, parameters).all()
+            plans.append("\n".join("  " + str(row[-1]) for row in plan_rows))
         return plans

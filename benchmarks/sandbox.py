@@ -63,39 +63,46 @@ input()
 def measure(_times: int) -> list[Measurement]:
     """Measure the sandbox, in about twenty seconds."""
     with Sandboxes() as sandboxes, sandboxes.open_private_folder() as folder:
-        cold = measure_wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
-        light = _collect_samples(100, lambda: _time_until_locked(sandboxes, "robot"))
-        heavy = _collect_samples(100, lambda: _time_until_locked(sandboxes, "responder with libraries"))
-        answers = _collect_samples(50, lambda: _time_until_answer(sandboxes, folder))
-        ends = _collect_samples(100, lambda: _time_until_gone(sandboxes))
-        turns = _time_turns(sandboxes, folder)
-        alone = _collect_samples(50, _time_lockdown)
-        dirty, share = _measure_memory(sandboxes, folder)
-        cpu = max(_measure_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))"))
-        stalled = _measure_stall_overshoot(sandboxes)
-        output = _measure_output_overshoot(sandboxes, folder)
+        cold_seconds = measure_wall_seconds(lambda: _spawn(sandboxes, "responder with libraries").close())
+        light_samples = _collect_samples(100, lambda: _time_until_locked(sandboxes, "robot"))
+        heavy_samples = _collect_samples(100, lambda: _time_until_locked(sandboxes, "responder with libraries"))
+        answer_samples = _collect_samples(50, lambda: _time_until_answer(sandboxes, folder))
+        end_samples = _collect_samples(100, lambda: _time_until_gone(sandboxes))
+        turn_samples = _time_turns(sandboxes, folder)
+        lockdown_seconds = _collect_samples(50, _time_lockdown)
+        private_memory, memory_share = _measure_memory(sandboxes, folder)
+        cpu_overshoot = max(
+            _measure_cpu_overshoot(sandboxes, text) for text in ("while True: pass", "sum(range(10**12))")
+        )
+        stall_overshoot = _measure_stall_overshoot(sandboxes)
+        output_overshoot = _measure_output_overshoot(sandboxes, folder)
     return [
-        _build_row("fork to locked, robot", light, 10),
-        _build_row("fork to locked, responder with scikit-learn", heavy, 15, 8),
-        _build_row("fork to first answer, responder", answers, 20),
-        _build_row("Landlock and the filter alone", alone, 5),
-        _build_row("message and answer", turns, 0.2),
-        _build_row("kill and reap, responder", ends, 15),
-        Measurement("sandbox: zygote with scikit-learn, cold start", cold, SECONDS, 5),
-        Measurement("sandbox: memory of an idle responder's own, one of ten", dirty, MEGABYTES, 5),
-        Measurement("sandbox: its share of all memory", share, MEGABYTES, 20),
-        Measurement("sandbox: CPU beyond the limit", 1000 * cpu, MILLISECONDS, 100),
-        Measurement("sandbox: waiting beyond the limit", 1000 * stalled, MILLISECONDS, 100),
-        Measurement("sandbox: output beyond the limit", output / 1024, KIBIBYTES, 128),
+        _build_row("fork to locked, robot", light_samples, 10),
+        _build_row("fork to locked, responder with scikit-learn", heavy_samples, 15, 8),
+        _build_row("fork to first answer, responder", answer_samples, 20),
+        _build_row("Landlock and the filter alone", lockdown_seconds, 5),
+        _build_row("message and answer", turn_samples, 0.2),
+        _build_row("kill and reap, responder", end_samples, 15),
+        Measurement("sandbox: zygote with scikit-learn, cold start", cold_seconds, SECONDS, 5),
+        Measurement("sandbox: memory of an idle responder's own, one of ten", private_memory, MEGABYTES, 5),
+        Measurement("sandbox: its share of all memory", memory_share, MEGABYTES, 20),
+        Measurement("sandbox: CPU beyond the limit", 1000 * cpu_overshoot, MILLISECONDS, 100),
+        Measurement("sandbox: waiting beyond the limit", 1000 * stall_overshoot, MILLISECONDS, 100),
+        Measurement("sandbox: output beyond the limit", output_overshoot / 1024, KIBIBYTES, 128),
         Measurement("sandbox: worker killed, until nothing is left", _time_until_nothing_left(), SECONDS, 1),
     ]
 
 
-def _build_row(what: str, seconds: list[float], budget: float, beyond: float | None = None) -> Measurement:
-    ordered = sorted(seconds)
-    late = ordered[len(ordered) * 95 // 100]
+def _build_row(title: str, seconds: list[float], budget: float, beyond: float | None = None) -> Measurement:
+    sorted_seconds = sorted(seconds)
+    late_seconds = sorted_seconds[len(sorted_seconds) * 95 // 100]
     return Measurement(
-        f"sandbox: {what}", 1000 * median(ordered), MILLISECONDS, budget, beyond, f"p95 {1000 * late:.2f} ms"
+        f"sandbox: {title}",
+        1000 * median(sorted_seconds),
+        MILLISECONDS,
+        budget,
+        beyond,
+        f"p95 {1000 * late_seconds:.2f} ms",
     )
 
 
@@ -113,9 +120,9 @@ def _spawn(sandboxes: Sandboxes, role: ChildRole, folder: Path | None = None) ->
 def _time_until_locked(sandboxes: Sandboxes, role: ChildRole) -> float:
     start = time.perf_counter()
     child = _spawn(sandboxes, role)
-    taken = time.perf_counter() - start
+    duration = time.perf_counter() - start
     child.close()
-    return taken
+    return duration
 
 
 def _time_until_gone(sandboxes: Sandboxes) -> float:
@@ -126,9 +133,9 @@ def _time_until_answer(sandboxes: Sandboxes, folder: Path) -> float:
     start = time.perf_counter()
     child = _start_echo(sandboxes, folder)
     _make_turn(child)
-    taken = time.perf_counter() - start
+    duration = time.perf_counter() - start
     child.close()
-    return taken
+    return duration
 
 
 def _time_turns(sandboxes: Sandboxes, folder: Path) -> list[float]:
@@ -148,8 +155,10 @@ def _start_echo(sandboxes: Sandboxes, folder: Path) -> ServedChild:
 
 
 def _start(child: ServedChild, role: ChildRole, text: str) -> None:
-    own = {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
-    child.send({"name": f"{role}.py", "text": text, "seed": 1, **own})
+    settings = (
+        {"preamble": "none", "sensors": {}, "modules": {}, "tick": TICK} if role == "robot" else {"function": None}
+    )
+    child.send({"name": f"{role}.py", "text": text, "seed": 1, **settings})
 
 
 def _make_turn(child: ServedChild) -> None:
@@ -160,7 +169,7 @@ def _make_turn(child: ServedChild) -> None:
 def _time_lockdown() -> float:
     """Return the seconds for the lockdown of a fork of this process, with the grants of a robot program."""
     rules = _prepare_rules()
-    reading, writing = os.pipe()
+    read_end, write_end = os.pipe()
     pid = os.fork()
     if pid == 0:
         start = time.perf_counter()
@@ -168,13 +177,13 @@ def _time_lockdown() -> float:
         lockdown.forbid_new_privileges()
         lockdown.restrict_files(rules)
         lockdown.restrict_system_calls()
-        os.write(writing, struct.pack("=d", time.perf_counter() - start))
+        os.write(write_end, struct.pack("=d", time.perf_counter() - start))
         os._exit(0)
     os.waitpid(pid, 0)
-    taken: float = struct.unpack("=d", os.read(reading, 8))[0]
-    os.close(reading)
-    os.close(writing)
-    return taken
+    duration: float = struct.unpack("=d", os.read(read_end, 8))[0]
+    os.close(read_end)
+    os.close(write_end)
+    return duration
 
 
 @functools.cache
@@ -215,9 +224,9 @@ def _run_until(sandboxes: Sandboxes, text: str, limits: ChildLimits, verdict: Ve
 
 
 def _measure_cpu_overshoot(sandboxes: Sandboxes, text: str) -> float:
-    before = sandboxes.children_cpu_seconds
+    cpu_before = sandboxes.children_cpu_seconds
     _run_until(sandboxes, text, ChildLimits(_CPU_LIMIT, 64 << 20), Verdict.CPU_LIMIT)
-    return sandboxes.children_cpu_seconds - before - _CPU_LIMIT
+    return sandboxes.children_cpu_seconds - cpu_before - _CPU_LIMIT
 
 
 def _measure_stall_overshoot(sandboxes: Sandboxes) -> float:
@@ -229,9 +238,9 @@ def _measure_output_overshoot(sandboxes: Sandboxes, folder: Path) -> int:
     """Return the bytes that a program could print after the worker had stopped reading."""
     child = _spawn(sandboxes, "robot", folder)
     _start(child, "robot", _FLOOD)
-    heard = 0
-    while heard <= _OUTPUT:
-        heard += len(child.receive(wire.ROBOT)["text"]) + 1
+    received_bytes = 0
+    while received_bytes <= _OUTPUT:
+        received_bytes += len(child.receive(wire.ROBOT)["text"]) + 1
     child.close()
     with (folder / "count").open("rb") as file, mmap.mmap(file.fileno(), 8, prot=mmap.PROT_READ) as count:
         return int.from_bytes(count[:], "little") - _OUTPUT
@@ -248,10 +257,10 @@ def _time_until_nothing_left() -> float:
     worker.wait()
     while _is_running(child) or _is_running(zygote):
         time.sleep(0.0005)
-    taken = time.perf_counter() - start
+    duration = time.perf_counter() - start
     worker.stdin.close()
     worker.stdout.close()
-    return taken
+    return duration
 
 
 def _is_running(process: Path) -> bool:

@@ -40,11 +40,11 @@ _LINES = 25
 def main() -> int:
     """Print the three tables."""
     references = dict(_read_references())
-    given = {name: collect_given_code(find_assignment(name)) for name, _ in references}
+    given_code = {name: collect_given_code(find_assignment(name)) for name, _ in references}
     print(f"alike from {SIMILARITY_THRESHOLD} on; {FEWEST_TOKENS} own tokens or more")
-    _print_alarms_within(given)
-    _print_alarms_between(references, given)
-    _print_detected_copies(references, given)
+    _print_alarms_within(given_code)
+    _print_alarms_between(references, given_code)
+    _print_detected_copies(references, given_code)
     for students in (60, 500, 2000):
         _print_cost(students)
     return 0
@@ -56,32 +56,36 @@ def _read_references() -> Iterator[tuple[tuple[str, str], str]]:
             yield (name, path.name), path.read_text(encoding="utf-8")
 
 
-def _print_alarms_within(given: Mapping[str, tuple[str, ...]]) -> None:
+def _print_alarms_within(given_code: Mapping[str, tuple[str, ...]]) -> None:
     """Print the false alarms among independent solutions of the same assignment."""
     pairs, alarms, highest = 0, [], 0.0
-    for name, file, written in WRITTEN_ANEW:
-        texts = {each: (locate_examples(name) / each / file).read_text(encoding="utf-8") for each in written}
-        for one, other in combinations(texts, 2):
-            sources = [build_source(each, file, texts[each]) for each in (one, other)]
-            writing = compare_sources(sources, given[name], alike=0.0)
-            if not writing.too_short:
+    for name, file, solutions in WRITTEN_ANEW:
+        texts = {each: (locate_examples(name) / each / file).read_text(encoding="utf-8") for each in solutions}
+        for first_name, second_name in combinations(texts, 2):
+            sources = [build_source(each, file, texts[each]) for each in (first_name, second_name)]
+            comparison = compare_sources(sources, given_code[name], cutoff=0.0)
+            if not comparison.too_short:
                 pairs += 1
-                highest = max([highest, *(each.share for each in writing.alike)])
-                alarms += [f"{name}: {one}, {other}" for each in writing.alike if each.share >= SIMILARITY_THRESHOLD]
+                highest = max([highest, *(each.share for each in comparison.alike)])
+                alarms += [
+                    f"{name}: {first_name}, {second_name}"
+                    for each in comparison.alike
+                    if each.share >= SIMILARITY_THRESHOLD
+                ]
     print(f"one assignment, written anew: {_format_rate(len(alarms), pairs)}; the highest share is {highest:.2f}")
 
 
-def _print_alarms_between(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
+def _print_alarms_between(references: Mapping[tuple[str, str], str], given_code: Mapping[str, tuple[str, ...]]) -> None:
     """Print the false alarms between all references: programs with programs, responders with responders."""
     for file in ("robot.py", "responder.py"):
         pairs, alarms = 0, []
         names = [name for name, which in references if which == file]
-        for one, other in combinations(names, 2):
-            sources = [build_source(name, file, references[name, file]) for name in (one, other)]
-            writing = compare_sources(sources, [*given[one], *given[other]])
-            if not writing.too_short:
+        for first_name, second_name in combinations(names, 2):
+            sources = [build_source(name, file, references[name, file]) for name in (first_name, second_name)]
+            comparison = compare_sources(sources, [*given_code[first_name], *given_code[second_name]])
+            if not comparison.too_short:
                 pairs += 1
-                alarms += [f"{one} and {other} {each.share:.2f}" for each in writing.alike]
+                alarms += [f"{first_name} and {second_name} {each.share:.2f}" for each in comparison.alike]
         print(f"references, {file}: {_format_rate(len(alarms), pairs)}")
         print("".join(f"    {alarm}\n" for alarm in alarms), end="")
 
@@ -91,25 +95,27 @@ def _format_rate(alarms: int, pairs: int) -> str:
     return f"{alarms} of {pairs} pairs are alike ({low:.0%} to {high:.0%})"
 
 
-def _print_detected_copies(references: Mapping[tuple[str, str], str], given: Mapping[str, tuple[str, ...]]) -> None:
-    for how, copyist in DISGUISES.items():
-        found = copies = 0
+def _print_detected_copies(
+    references: Mapping[tuple[str, str], str], given_code: Mapping[str, tuple[str, ...]]
+) -> None:
+    for disguise, copyist in DISGUISES.items():
+        detected = copies = 0
         for (name, file), text in references.items():
-            writing = compare_sources(
-                [build_source("one", file, text), build_source("other", file, copyist(text))], given[name]
+            comparison = compare_sources(
+                [build_source("one", file, text), build_source("other", file, copyist(text))], given_code[name]
             )
-            if "one" not in writing.too_short:
+            if "one" not in comparison.too_short:
                 copies += 1
-                found += bool(writing.alike)
-        print(f"{how}: {found} of {copies} copies found")
+                detected += bool(comparison.alike)
+        print(f"{disguise}: {detected} of {copies} copies found")
 
 
 def _print_cost(students: int) -> None:
     texts = [_build_program(random.Random(number)) for number in range(students)]
-    began = time.process_time()
+    start = time.process_time()
     sources = [build_source(str(number), "robot.py", text) for number, text in enumerate(texts)]
     alike = compare_sources(sources, []).alike
-    seconds, megabytes = time.process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    seconds, megabytes = time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{students} students, {len(sources[0].tokens)} tokens each: {seconds:.2f} s, {len(alike)} alike, ", end="")
     print(f"{megabytes:.0f} MB at most in this process")
 

@@ -49,31 +49,35 @@ def measure(times: int) -> list[Measurement]:
     pixels = build_floor(FLOOR).pixels
     arena, cached, camera = Arena(), CachedCamera(pixels), BulletCamera(pixels)
     try:
-        table = measure_median(times, lambda: measure_cpu_seconds(lambda: _follow(arena, cached)))
-        shots = measure_median(min(times, 3), lambda: measure_cpu_seconds(lambda: _follow(arena, camera)))
-        differing = _count_differing_pixels(camera, pixels)
+        table_seconds = measure_median(times, lambda: measure_cpu_seconds(lambda: _follow(arena, cached)))
+        camera_seconds = measure_median(min(times, 3), lambda: measure_cpu_seconds(lambda: _follow(arena, camera)))
+        differing_pixels = _count_differing_pixels(camera, pixels)
     finally:
         camera.close()
         cached.close()
         arena.close()
     with TrialRunner() as runner:
-        both = measure_median(max(times, 5), lambda: measure_through_processes(runner, build_spec(FOLLOWER)))
-        ready = measure_median(4 * times, lambda: measure_wall_seconds(lambda: runner.run(build_spec("pass"))))
+        process_seconds = measure_median(max(times, 5), lambda: measure_through_processes(runner, build_spec(FOLLOWER)))
+        ready_seconds = measure_median(4 * times, lambda: measure_wall_seconds(lambda: runner.run(build_spec("pass"))))
     return [
-        Measurement(f"{_ALONE}, sensor table", SECONDS / table, SPEED, 400, 800, f"{table:.3f} s"),
+        Measurement(f"{_ALONE}, sensor table", SECONDS / table_seconds, SPEED, 400, 800, f"{table_seconds:.3f} s"),
         Measurement(
-            f"{_ALONE}, a PyBullet camera image each tick", SECONDS / shots, SPEED, 60, details=f"{shots:.3f} s"
+            f"{_ALONE}, a PyBullet camera image each tick",
+            SECONDS / camera_seconds,
+            SPEED,
+            60,
+            details=f"{camera_seconds:.3f} s",
         ),
         Measurement(
             "the same through both sandboxed processes, CPU of all against the simulator alone",
-            both / table,
+            process_seconds / table_seconds,
             RATIO,
             3,
             2,
-            f"{both:.3f} s, {SECONDS / both:.0f}x",
+            f"{process_seconds:.3f} s, {SECONDS / process_seconds:.0f}x",
         ),
-        Measurement("a whole trial of an empty program with a responder", 1000 * ready, MILLISECONDS, 30),
-        Measurement("pixels that PyBullet's camera sees otherwise than the image", differing, COUNT, 0),
+        Measurement("a whole trial of an empty program with a responder", 1000 * ready_seconds, MILLISECONDS, 30),
+        Measurement("pixels that PyBullet's camera sees otherwise than the image", differing_pixels, COUNT, 0),
     ]
 
 
@@ -117,8 +121,8 @@ def build_spec(program: str) -> TrialSpec:
     )
 
 
-def measure_through_processes(runner: TrialRunner, wanted: TrialSpec) -> float:
+def measure_through_processes(runner: TrialRunner, spec: TrialSpec) -> float:
     """Return the CPU seconds of the worker and of both students' processes."""
-    before = runner.children_cpu_seconds
-    own = measure_cpu_seconds(lambda: runner.run(wanted))
-    return own + runner.children_cpu_seconds - before
+    children_before = runner.children_cpu_seconds
+    worker_seconds = measure_cpu_seconds(lambda: runner.run(spec))
+    return worker_seconds + runner.children_cpu_seconds - children_before

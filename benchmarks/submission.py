@@ -43,7 +43,9 @@ def _measure_once(store: Store, notifier: Notifier, student: str) -> tuple[float
     """Return the seconds until the marks are committed, and until the plots are."""
     assignment = find_assignment(_ASSIGNMENT)
     start = time.perf_counter()
-    submission = read_submission(locate_examples(_ASSIGNMENT) / "reference", student=student, asked=assignment.parts)
+    submission = read_submission(
+        locate_examples(_ASSIGNMENT) / "reference", student=student, required_parts=assignment.parts
+    )
     # One file differs, because identical submissions are graded only once.
     submission = replace(submission, files={**submission.files, "student.txt": student.encode()})
     job = intake.accept_submission(store, GradingRequest(submission, assignment, student), max_attempts=3).job_id

@@ -32,33 +32,33 @@ class RecordedRun:
 
     def scale_to_machine(self, loop_seconds: float | None, row: Measurement) -> float | None:
         """Return the earlier value, scaled to a machine with this loop time, or None if it was not measured."""
-        value, then = self.values.get(row.what), self.values.get(LOOP)
-        if value is None or not then or not loop_seconds or row.what == LOOP:
+        value, recorded_loop = self.values.get(row.what), self.values.get(LOOP)
+        if value is None or not recorded_loop or not loop_seconds or row.what == LOOP:
             return value
-        return value * (loop_seconds / then) ** row.unit.slowness
+        return value * (loop_seconds / recorded_loop) ** row.unit.slowness
 
 
 def load_recorded_run(path: Path = RECORDED) -> RecordedRun | None:
     """Return the run in the file, or None if there is none."""
     if not path.exists():
         return None
-    written = json.loads(path.read_text())
-    return RecordedRun(written["at"], {line["what"]: line["value"] for line in written["lines"]})
+    contents = json.loads(path.read_text())
+    return RecordedRun(contents["at"], {line["what"]: line["value"] for line in contents["lines"]})
 
 
 def write_rows(path: Path, rows: Sequence[Measurement]) -> None:
     """Replace the rows with the same names in the file. Other rows stay."""
     lines = {line["what"]: line for line in json.loads(path.read_text())["lines"]} if path.exists() else {}
     lines |= {row.what: _build_entry(row) for row in rows}
-    written = {
+    contents = {
         "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "python": platform.python_version(),
         "lines": list(lines.values()),
     }
-    path.write_text(json.dumps(written, indent=1) + "\n")
+    path.write_text(json.dumps(contents, indent=1) + "\n")
 
 
-def print_rows(rows: Sequence[Measurement], before: RecordedRun | None) -> None:
+def print_rows(rows: Sequence[Measurement], recorded_run: RecordedRun | None) -> None:
     """Print each row with its budget and the recorded value, scaled to this machine."""
     loop = next((row.value for row in rows if row.what == LOOP), None)
     table = Table("what", box=None, pad_edge=False)
@@ -66,17 +66,20 @@ def print_rows(rows: Sequence[Measurement], before: RecordedRun | None) -> None:
         table.add_column(heading, justify="right")
     table.add_column("spread")
     for row in rows:
-        then = None if before is None else before.scale_to_machine(loop, row)
+        recorded_value = None if recorded_run is None else recorded_run.scale_to_machine(loop, row)
         table.add_row(
             Text(row.what),
             Text(row.unit.format_value(row.value), style="red" if row.misses else ""),
-            *("" if value is None else row.unit.format_value(value) for value in (row.budget, row.beyond, then)),
+            *(
+                "" if value is None else row.unit.format_value(value)
+                for value in (row.budget, row.beyond, recorded_value)
+            ),
             row.details,
         )
     console = Console(width=170)
     console.print(table)
-    if before is not None:
-        console.print(f"recorded: {before.at}; times are scaled by the loop where both runs have it")
+    if recorded_run is not None:
+        console.print(f"recorded: {recorded_run.at}; times are scaled by the loop where both runs have it")
     for row in rows:
         if row.gates:
             console.print(f"misses its budget: {row.what}: {row.unit.format_value(row.value)}", style="red")

@@ -68,13 +68,13 @@ class _Browser:
         return self._ask("POST", path, body, headers)
 
     def _ask(self, method: str, path: str, body: bytes, headers: dict[str, str]) -> tuple[int, float]:
-        begun = time.perf_counter()
+        start = time.perf_counter()
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
         try:
             connection.request(method, path, body, {"cookie": f"{SESSION_COOKIE}={self.secret}", **headers})
             answer = connection.getresponse()
             answer.read()
-            return answer.status, time.perf_counter() - begun
+            return answer.status, time.perf_counter() - start
         finally:
             connection.close()
 
@@ -86,8 +86,8 @@ def measure(times: int) -> list[Measurement]:
 
 
 def _measure_page(server: PostgresqlServer, times: int) -> list[Measurement]:
-    with ExitStack() as held:
-        store, port = _start_service(held, server, workers=1)
+    with ExitStack() as stack:
+        store, port = _start_service(stack, server, workers=1)
         many_rows.fill(store, create_graded_batch(store))
         with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
             connection.exec_driver_sql("VACUUM ANALYZE")
@@ -95,12 +95,14 @@ def _measure_page(server: PostgresqlServer, times: int) -> list[Measurement]:
         path = f"/courses/1/batches/{many_rows.format_batch_name(3)}"
         for _ in range(2):
             status, _ = browser.get(path)
-        taken = [browser.get(path)[1] for _ in range(times)]
+        durations = [browser.get(path)[1] for _ in range(times)]
     if status != 200:
         raise RuntimeError(f"the page of a batch answered {status}")
-    told = f"most {1000 * max(taken):.0f} ms"
+    details = f"most {1000 * max(durations):.0f} ms"
     return [
-        Measurement("web, PostgreSQL: page of a batch of 2000", 1000 * median(taken), MILLISECONDS, 300, details=told)
+        Measurement(
+            "web, PostgreSQL: page of a batch of 2000", 1000 * median(durations), MILLISECONDS, 300, details=details
+        )
     ]
 
 
@@ -111,57 +113,57 @@ def _create_instructor(store: Store) -> int:
 
 
 def _measure_class(server: PostgresqlServer) -> list[Measurement]:
-    with ExitStack() as held:
-        store, port = _start_service(held, server, workers=2)
+    with ExitStack() as stack:
+        store, port = _start_service(stack, server, workers=2)
         names = [f"student-{number}" for number in range(_STUDENTS)]
         with store.transaction() as session:
             members = [membership.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
             open_assignments.prepare_assignment(session, 1, freeze_assignment(find_assignment(ASSIGNMENT)))
             open_assignments.open_for_students(session, 1, ASSIGNMENT)
         browsers = [_Browser(port, _create_session(store, person_id)) for person_id in members]
-        begun = time.monotonic()
+        start = time.monotonic()
         chance = random.Random(1)
         moments = sorted(chance.uniform(0, _WITHIN_SECONDS) for _ in names)
 
         def upload(number: int) -> tuple[int, float]:
-            time.sleep(max(0.0, begun + moments[number] - time.monotonic()))
-            asked = build_short_request(names[number]).submission
-            assert asked.program is not None
-            assert asked.responder is not None
-            files = [("robot.py", asked.program.text), ("responder.py", asked.responder.text)]
+            time.sleep(max(0.0, start + moments[number] - time.monotonic()))
+            submission = build_short_request(names[number]).submission
+            assert submission.program is not None
+            assert submission.responder is not None
+            files = [("robot.py", submission.program.text), ("responder.py", submission.responder.text)]
             return browsers[number].upload(f"/courses/1/mine/{ASSIGNMENT}", files)
 
         with ThreadPoolExecutor(_AT_A_TIME) as pool:
             answers = list(pool.map(upload, range(_STUDENTS)))
-        last = _wait_until_graded(store, begun)
+        last_seconds = _wait_until_graded(store, start)
         with store.reading() as session:
-            kept = session.scalar(select(func.count()).select_from(Job)) or 0
-            graded = session.scalar(select(func.count()).where(Job.state == JobState.DONE)) or 0
-    taken = sorted(seconds for _, seconds in answers)
-    lost = _STUDENTS - min(kept, graded, sum(status == 303 for status, _ in answers))
-    what = f"web, PostgreSQL, 2 workers: {_STUDENTS} students upload within a minute"
-    told = f"half {compute_quantile(taken, 0.5):.3f} s, 19 of 20 {compute_quantile(taken, 0.95):.3f} s"
+            job_count = session.scalar(select(func.count()).select_from(Job)) or 0
+            graded_count = session.scalar(select(func.count()).where(Job.state == JobState.DONE)) or 0
+    durations = sorted(seconds for _, seconds in answers)
+    lost_count = _STUDENTS - min(job_count, graded_count, sum(status == 303 for status, _ in answers))
+    title = f"web, PostgreSQL, 2 workers: {_STUDENTS} students upload within a minute"
+    details = f"half {compute_quantile(durations, 0.5):.3f} s, 19 of 20 {compute_quantile(durations, 0.95):.3f} s"
     return [
-        Measurement(f"{what}: slowest answer", taken[-1], SECONDS, 1.0, details=told),
-        Measurement(f"{what}: lost", lost, COUNT, 0),
-        Measurement(f"{what}: the last is graded after", last, SECONDS),
+        Measurement(f"{title}: slowest answer", durations[-1], SECONDS, 1.0, details=details),
+        Measurement(f"{title}: lost", lost_count, COUNT, 0),
+        Measurement(f"{title}: the last is graded after", last_seconds, SECONDS),
     ]
 
 
-def _start_service(held: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
+def _start_service(stack: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
     """Yield the service on an empty database when it is ready, with the port of its web server."""
-    folder = held.enter_context(tempfile.TemporaryDirectory())
+    folder = stack.enter_context(tempfile.TemporaryDirectory())
     settings = load_settings(home=Path(folder), database_url=create_database(server.url), concurrency=1)
-    store = held.enter_context(open_store(settings))
-    listening = held.enter_context(listen("127.0.0.1", 0))
-    service = held.enter_context(Supervisor(settings, store, workers, listening))
+    store = stack.enter_context(open_store(settings))
+    listener = stack.enter_context(listen("127.0.0.1", 0))
+    service = stack.enter_context(Supervisor(settings, store, workers, listener))
     service.ensure()
-    begun = time.monotonic()
+    start = time.monotonic()
     while not service.is_ready:
-        if time.monotonic() - begun > _PATIENCE_SECONDS:
+        if time.monotonic() - start > _PATIENCE_SECONDS:
             raise RuntimeError("the service does not come up")
         time.sleep(0.1)
-    port: int = listening.getsockname()[1]
+    port: int = listener.getsockname()[1]
     return store, port
 
 
@@ -170,12 +172,12 @@ def _create_session(store: Store, person_id: int) -> str:
         return credentials.issue_credential(session, person_id, CredentialKind.SESSION, timedelta(hours=1))
 
 
-def _wait_until_graded(store: Store, begun: float) -> float:
+def _wait_until_graded(store: Store, start: float) -> float:
     while True:
         with store.reading() as session:
-            left = session.scalar(select(func.count()).where(Job.state.in_((JobState.QUEUED, JobState.RUNNING))))
-        if not left:
-            return time.monotonic() - begun
-        if time.monotonic() - begun > _PATIENCE_SECONDS:
+            unfinished = session.scalar(select(func.count()).where(Job.state.in_((JobState.QUEUED, JobState.RUNNING))))
+        if not unfinished:
+            return time.monotonic() - start
+        if time.monotonic() - start > _PATIENCE_SECONDS:
             raise RuntimeError("the class's submissions do not come to an end")
         time.sleep(0.1)

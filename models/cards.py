@@ -135,8 +135,8 @@ def load_weights(name: str) -> bytes:
     Raises:
         HostError: The file does not match the hash on its card.
     """
-    about = load_card(name)
-    data = (_locate_weights_folder() / about.file).read_bytes()
-    if hashlib.sha256(data).hexdigest() != about.sha256:
-        raise HostError(f"the weights of {name} ({about.file}) do not match its card; install again")
+    card = load_card(name)
+    data = (_locate_weights_folder() / card.file).read_bytes()
+    if hashlib.sha256(data).hexdigest() != card.sha256:
+        raise HostError(f"the weights of {name} ({card.file}) do not match its card; install again")
     return data

@@ -58,14 +58,14 @@ class Convolution:
         side, classes = math.isqrt(images.shape[1]), int(labels.max()) + 1
         layers = self._build_layers(side, classes, chance)
         descent = _AdamOptimizer([weights for layer in layers for weights in layer.weights], self.decay)
-        shown = images.astype(np.float32).reshape(-1, side, side, 1)
-        steps = self.passes * (len(shown) // _BATCH)
+        inputs = images.astype(np.float32).reshape(-1, side, side, 1)
+        steps = self.passes * (len(inputs) // _BATCH)
         for number in range(steps):
-            at = number % (len(shown) // _BATCH)
-            if at == 0:
-                order = chance.permutation(len(shown))
-            rows = order[at * _BATCH : (at + 1) * _BATCH]
-            _compute_gradients(layers, shown[rows], labels[rows])
+            batch_index = number % (len(inputs) // _BATCH)
+            if batch_index == 0:
+                order = chance.permutation(len(inputs))
+            rows = order[batch_index * _BATCH : (batch_index + 1) * _BATCH]
+            _compute_gradients(layers, inputs[rows], labels[rows])
             size = self.step * (1 + math.cos(math.pi * number / steps)) / 2 * min(1.0, (number + 1) / _WARM_UP)
             descent.step([slopes for layer in layers for slopes in layer.gradients], size)
         for layer in layers:
@@ -113,13 +113,13 @@ class _AdamOptimizer:
     def step(self, slopes: Sequence[Floats], size: float) -> None:
         """Update each weight by one step along the negative gradients in ``slopes``."""
         self._steps += 1
-        corrected = size * math.sqrt(1 - _SQUARE**self._steps) / (1 - _MEAN**self._steps)
+        corrected_size = size * math.sqrt(1 - _SQUARE**self._steps) / (1 - _MEAN**self._steps)
         for weights, slope, mean, square in zip(self._weights, slopes, self._means, self._squares, strict=True):
             mean += (1 - _MEAN) * (slope - mean)
             square += (1 - _SQUARE) * (slope * slope - square)
             if weights.ndim > 1:
                 weights *= 1 - size * self._decay
-            weights -= corrected * mean / (np.sqrt(square) + 1e-8)
+            weights -= corrected_size * mean / (np.sqrt(square) + 1e-8)
 
 
 def _compute_gradients(layers: Sequence[Layer], images: Floats, labels: NDArray[np.int64]) -> None:

@@ -54,35 +54,35 @@ def evaluate(name: str) -> Evaluation:
     Raises:
         UsageError: No classifier has this name.
     """
-    about = load_card(name)
-    measured, answered = measure(load_tasks()[name], load_network(about.file, load_weights(name)))
-    return Evaluation(about, measured, answered)
+    card = load_card(name)
+    results, classified_images = measure(load_tasks()[name], load_network(card.file, load_weights(name)))
+    return Evaluation(card, results, classified_images)
 
 
 def measure(task: Task, network: Network) -> tuple[AccuracyResults, tuple[ClassifiedImage, ...]]:
     """Run the whole test of ``task`` and return the results and the images that count for its accuracy."""
     with Photographer() as photographer:
-        answered = tuple(_classify_test_images(task, network, photographer))
+        classified_images = tuple(_classify_test_images(task, network, photographer))
         curves = tuple(_measure_curves(task, network, photographer))
     confusion = np.zeros((len(task.classes), len(task.classes)), np.int64)
-    for each in answered:
-        confusion[each.place.label, each.answer] += 1
+    for image in classified_images:
+        confusion[image.place.label, image.answer] += 1
     table = tuple(tuple(int(count) for count in row) for row in confusion)
-    return AccuracyResults(Tally(int(np.trace(confusion)), len(answered)), table, curves), answered
+    return AccuracyResults(Tally(int(np.trace(confusion)), len(classified_images)), table, curves), classified_images
 
 
 def _classify_test_images(task: Task, network: Network, photographer: Photographer) -> Iterator[ClassifiedImage]:
     test = task.test()
     for noise, draws in test.noises:
-        found = list(photographer.draws(test.places, Shift(noise=noise), "accuracy", draws))
-        answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in found]))
-        for (place, grey), answer in zip(found, answers, strict=True):
+        photographs = list(photographer.draws(test.places, Shift(noise=noise), "accuracy", draws))
+        answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in photographs]))
+        for (place, grey), answer in zip(photographs, answers, strict=True):
             yield ClassifiedImage(place, noise, grey, int(answer))
 
 
 def _measure_curves(task: Task, network: Network, photographer: Photographer) -> Iterator[CardCurve]:
-    words = ("light noise", "grey levels either way", "on the spot")
-    yield _measure_curve(task, network, photographer, words, _LIGHT_NOISES, Shift(), "noise")
+    headings = ("light noise", "grey levels either way", "on the spot")
+    yield _measure_curve(task, network, photographer, headings, _LIGHT_NOISES, Shift(), "noise")
     sweeps: tuple[tuple[str, str, tuple[float, ...], Axis], ...] = (
         ("offset in x", "mm", _MILLIMETRES, "x"),
         ("offset in y", "mm", _MILLIMETRES, "y"),
@@ -90,8 +90,8 @@ def _measure_curves(task: Task, network: Network, photographer: Photographer) ->
     )
     for varied, unit, values, axis in sweeps:
         for noise in task.test().noises_beside:
-            words = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
-            yield _measure_curve(task, network, photographer, words, values, Shift(noise=noise), axis)
+            headings = (varied, unit, f"light noise {noise:g}" if noise else "no noise")
+            yield _measure_curve(task, network, photographer, headings, values, Shift(noise=noise), axis)
     for altered in task.test().altered:
         tallies = tuple(_count_correct(task, network, list(altered.seen(value))) for value in altered.values)
         yield CardCurve(altered.varied, altered.unit, altered.under, altered.values, tallies)
@@ -101,20 +101,20 @@ def _measure_curve(
     task: Task,
     network: Network,
     photographer: Photographer,
-    words: tuple[str, str, str],
+    headings: tuple[str, str, str],
     values: Sequence[float],
-    rest: Shift,
+    base_shift: Shift,
     axis: Axis,
 ) -> CardCurve:
     test = task.test()
     tallies = []
     for value in values:
-        found = photographer.draws(test.swept, replace(rest, **{axis: value}), "curve", test.draws)
-        tallies.append(_count_correct(task, network, [(place.label, grey) for place, grey in found]))
-    return CardCurve(*words, tuple(float(value) for value in values), tuple(tallies))
+        photographs = photographer.draws(test.swept, replace(base_shift, **{axis: value}), "curve", test.draws)
+        tallies.append(_count_correct(task, network, [(place.label, grey) for place, grey in photographs]))
+    return CardCurve(*headings, tuple(float(value) for value in values), tuple(tallies))
 
 
-def _count_correct(task: Task, network: Network, seen: Sequence[tuple[int, Grey]]) -> Tally:
-    answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in seen]))
-    right = sum(label == answer for (label, _), answer in zip(seen, answers, strict=True))
-    return Tally(int(right), len(seen))
+def _count_correct(task: Task, network: Network, examples: Sequence[tuple[int, Grey]]) -> Tally:
+    answers = network.predict(np.array([compute_features(grey, task.side) for _, grey in examples]))
+    correct = sum(label == answer for (label, _), answer in zip(examples, answers, strict=True))
+    return Tally(int(correct), len(examples))

@@ -45,7 +45,7 @@ class Photographer:
     def __init__(self) -> None:
         self._arena = Arena(())
         # The test visits up to six sheets, once for each value of a varied condition.
-        self._cameras = Cameras(most=6)
+        self._cameras = Cameras(capacity=6)
         self._robot = get_robot("Default_Robot")
 
     def __enter__(self) -> Photographer:

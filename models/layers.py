@@ -49,15 +49,15 @@ class ConvolutionLayer(Layer):
         return np.asarray(self._windows @ filters + offsets).reshape(*self._places, -1)
 
     def backward(self, slopes: Floats) -> Floats:
-        flat = slopes.reshape(-1, slopes.shape[-1])
-        self.gradients = (self._windows.T @ flat, flat.sum(axis=0))
+        flat_slopes = slopes.reshape(-1, slopes.shape[-1])
+        self.gradients = (self._windows.T @ flat_slopes, flat_slopes.sum(axis=0))
         (count, height, width), (_, tall, wide, channels) = self._places, self._shape
-        back = (flat @ self.weights[0].T).reshape(count, height, width, self.side, self.side, channels)
-        padded = np.zeros((count, tall + 2 * self.margin, wide + 2 * self.margin, channels), np.float32)
+        window_slopes = (flat_slopes @ self.weights[0].T).reshape(count, height, width, self.side, self.side, channels)
+        padded_slopes = np.zeros((count, tall + 2 * self.margin, wide + 2 * self.margin, channels), np.float32)
         for row in range(self.side):
             for column in range(self.side):
-                padded[:, row : row + height, column : column + width] += back[:, :, :, row, column]
-        return padded[:, self.margin : self.margin + tall, self.margin : self.margin + wide]
+                padded_slopes[:, row : row + height, column : column + width] += window_slopes[:, :, :, row, column]
+        return padded_slopes[:, self.margin : self.margin + tall, self.margin : self.margin + wide]
 
 
 class MaxPoolingLayer(Layer):
@@ -103,8 +103,8 @@ class DropoutLayer(Layer):
         self._share, self._chance = share, chance
 
     def forward(self, values: Floats) -> Floats:
-        kept = self._chance.random(values.shape, dtype=np.float32) >= self._share
-        self._kept = kept.astype(np.float32) / np.float32(1 - self._share)
+        mask = self._chance.random(values.shape, dtype=np.float32) >= self._share
+        self._kept = mask.astype(np.float32) / np.float32(1 - self._share)
         return values * self._kept
 
     def backward(self, slopes: Floats) -> Floats:

@@ -40,6 +40,8 @@ class _OnnxSession:
         self._session: Any = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
 
     def predict(self, images: Vector) -> NDArray[np.int64]:
-        (asked,) = self._session.get_inputs()
-        (shares,) = self._session.run(None, {asked.name: images.astype(np.float32).reshape(-1, *asked.shape[1:])})
+        (input_node,) = self._session.get_inputs()
+        (shares,) = self._session.run(
+            None, {input_node.name: images.astype(np.float32).reshape(-1, *input_node.shape[1:])}
+        )
         return np.asarray(shares.argmax(axis=1), np.int64)

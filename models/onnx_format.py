@@ -57,8 +57,8 @@ def _build_nodes(layers: Iterable[Layer], side: int) -> Iterator[_Node]:
         match layer:
             case ConvolutionLayer():
                 filters, offsets = layer.weights
-                turned = filters.reshape(layer.side, layer.side, shape[2], -1).transpose(3, 2, 0, 1)
-                yield _Node("Conv", (turned, offsets), {"pads": [layer.margin] * 4})
+                transposed_filters = filters.reshape(layer.side, layer.side, shape[2], -1).transpose(3, 2, 0, 1)
+                yield _Node("Conv", (transposed_filters, offsets), {"pads": [layer.margin] * 4})
                 smaller = 2 * layer.margin - layer.side + 1
                 shape = (shape[0] + smaller, shape[1] + smaller, len(offsets))
             case MaxPoolingLayer():

@@ -26,10 +26,10 @@ def train(name: str, folder: Path) -> Card:
         UsageError: The name is unknown, a package with the training data is missing, or the folder cannot be created.
         HostError: The training process failed.
     """
-    known = load_tasks()
-    if name not in known:
-        raise UsageError(f"there is no model called {name!r} to train; expected one of {', '.join(known)}")
-    package = known[name].needs
+    tasks = load_tasks()
+    if name not in tasks:
+        raise UsageError(f"there is no model called {name!r} to train; expected one of {', '.join(tasks)}")
+    package = tasks[name].needs
     if package is not None and importlib.util.find_spec(package) is None:
         raise UsageError(
             f"training {name} needs the handwriting in {package}, which is not installed; "
@@ -43,9 +43,9 @@ def train(name: str, folder: Path) -> Card:
     process = launch_process(
         command, build_arithmetic_environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    _, said = process.communicate()
+    _, errors = process.communicate()
     if process.returncode != 0:
-        reason = (said.strip().splitlines() or ["no reason given"])[-1]
+        reason = (errors.strip().splitlines() or ["no reason given"])[-1]
         raise HostError(f"training {name} failed: {reason}")
     return Card.from_json((folder / f"{name}.json").read_text())
 
@@ -57,7 +57,7 @@ def _main(name: str, folder: Path) -> None:
     task = load_tasks()[name]
     images, labels = task.examples()
     data = task.plan.fit(images, labels)
-    measured, _ = measure(task, load_network(task.file, data))
+    results, _ = measure(task, load_network(task.file, data))
     resized = "" if task.side == 14 else f", resized to {task.side} x {task.side} by LANCZOS"
     card = Card(
         name=name,
@@ -70,7 +70,7 @@ def _main(name: str, folder: Path) -> None:
         test_data=task.test().words,
         seed=task.plan.seed,
         classes=task.classes,
-        measured=measured,
+        measured=results,
         libraries={package: version(package) for package in ("joblib", "numpy", "pillow", "scikit-learn")},
         sha256=hashlib.sha256(data).hexdigest(),
     )

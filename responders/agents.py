@@ -76,9 +76,9 @@ class Agents:
         self._loaded = False
         self._unloadable = 0  # number of faults from loading
         self._processes: dict[str, AgentProcess] = {}
-        for name, each in specs.items():
+        for name, agent_spec in specs.items():
             folder = stack.enter_context(sandboxes.open_private_folder())
-            self._processes[name] = AgentProcess(name, each, sandboxes, folder, seed, meter, self)
+            self._processes[name] = AgentProcess(name, agent_spec, sandboxes, folder, seed, meter, self)
             stack.callback(self._processes[name].close)
 
     def list_askable_agents(self, asker: str) -> Sequence[str]:
@@ -97,9 +97,9 @@ class Agents:
         self._loaded = True
         self._unloadable = len(self.faults)
 
-    def collect_faults_since(self, since: AgentCounts) -> Sequence[Fault]:
-        """Return all loading faults, and the other faults recorded since ``since``."""
-        return (*self.faults[: self._unloadable], *self.faults[max(since.faults, self._unloadable) :])
+    def collect_faults_since(self, earlier_counts: AgentCounts) -> Sequence[Fault]:
+        """Return all loading faults, and the other faults recorded since ``earlier_counts``."""
+        return (*self.faults[: self._unloadable], *self.faults[max(earlier_counts.faults, self._unloadable) :])
 
     def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> AgentReply:
         """Ask the agent named in ``question`` and return its reply.
@@ -119,22 +119,22 @@ class Agents:
             raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it asked an agent that this assignment does not have")
         if len(self.messages) >= 2 * _MOST_QUESTIONS:
             raise ChildStopped(Verdict.OUTPUT_LIMIT, f"it and the agents asked more than {_MOST_QUESTIONS} questions")
-        arguments, named = _parse_content(question["arguments"], list), _parse_content(question["named"], dict)
-        values = [*arguments, *named.values()]
+        arguments, keywords = _parse_content(question["arguments"], list), _parse_content(question["named"], dict)
+        values = [*arguments, *keywords.values()]
         index = len(self.messages)
         self._record_message(asker, name, values[0] if len(values) == 1 else values, t, message)
-        told = self._find_refusal(asker, name)
-        if told is None:
+        reply = self._find_refusal(asker, name)
+        if reply is None:
             self._waiting.append(name)
             try:
-                told = process.answer_question(question, t, message)
+                reply = process.answer_question(question, t, message)
             finally:
                 self._waiting.pop()
-        if told.kind == "error":
+        if reply.kind == "error":
             self.messages[index] = replace(self.messages[index], note="no answer")
         else:
-            self._record_message(name, asker, _parse_content(told.text, object), t + told.slept, message, index)
-        return told
+            self._record_message(name, asker, _parse_content(reply.text, object), t + reply.slept, message, index)
+        return reply
 
     def count_events(self) -> AgentCounts:
         """Return the current counts of messages, faults and calls."""
@@ -149,38 +149,42 @@ class Agents:
         """End the agents' processes and collect their output, logs and notes."""
         for name, process in self._processes.items():
             process.close()
-            log, unread = read_log(process.folder, self._meter, name)
-            if unread is not None:
-                self.faults.append(unread)
+            log, log_fault = read_log(process.folder, self._meter, name)
+            if log_fault is not None:
+                self.faults.append(log_fault)
             self._outputs.append(AgentOutput(name, "\n".join(process.output), log))
             self.notes += process.notes
 
-    def add_messages_and_calls(self, recording: Recording, since: AgentCounts) -> Recording:
-        """Return the recording with the agent messages and calls since ``since``."""
-        talk = [
-            replace(each, reply_to=None if each.reply_to is None else each.reply_to - since.messages)
-            for each in self.messages[since.messages :]
+    def add_messages_and_calls(self, recording: Recording, earlier_counts: AgentCounts) -> Recording:
+        """Return the recording with the agent messages and calls since ``earlier_counts``."""
+        messages = [
+            replace(each, reply_to=None if each.reply_to is None else each.reply_to - earlier_counts.messages)
+            for each in self.messages[earlier_counts.messages :]
         ]
-        own = [call for name, process in self._processes.items() for call in process.calls[since.calls.get(name, 0) :]]
-        calls = [replace(call, before=call.before - since.messages) for call in own]
+        new_calls = [
+            call
+            for name, process in self._processes.items()
+            for call in process.calls[earlier_counts.calls.get(name, 0) :]
+        ]
+        calls = [replace(call, before=call.before - earlier_counts.messages) for call in new_calls]
         return replace(
             recording,
             calls=tuple(sorted((*recording.calls, *calls), key=lambda call: (call.message, call.before))),
-            agent_messages=tuple(talk),
+            agent_messages=tuple(messages),
         )
 
     def add_outputs(self, recording: Recording) -> Recording:
         """Return the recording with the output and logs of all agents. Call ``finish`` first."""
         return replace(recording, agent_outputs=tuple(self._outputs))
 
-    def record_failure(self, name: str, fault: Fault, why: str, slept: int) -> AgentReply:
+    def record_failure(self, name: str, fault: Fault, reason: str, slept: int) -> AgentReply:
         """Return the error that the asker receives when agent ``name`` fails.
 
         Records the fault, unless a given agent failed but is still running: the asker may have caused that, so it
         becomes a note.
         """
         process = self._processes[name]
-        sentence = f"{name} gave no answer: {why}"
+        sentence = f"{name} gave no answer: {reason}"
         if not process.given or not process.is_alive:
             self.faults.append(fault)
         elif len(self.notes) < _MOST_NOTES and f"the given agent {sentence}" not in self.notes:
@@ -191,8 +195,8 @@ class Agents:
         if not self._loaded:
             return AgentReply("error", f"{name} cannot be asked while the agents are being loaded, only in a function")
         if name in self._waiting or name == asker:
-            way = " → ".join(["responder", *self._waiting, name])
-            return AgentReply("error", f"{name} cannot be asked now, as it waits for an answer itself: {way}")
+            waiting_chain = " → ".join(["responder", *self._waiting, name])
+            return AgentReply("error", f"{name} cannot be asked now, as it waits for an answer itself: {waiting_chain}")
         return None
 
     def _record_message(
@@ -256,9 +260,9 @@ class AgentProcess(ResponderProcess):
         except Exception as error:
             stop = to_child_data_error(error)
         fault = self._convert_stop(stop, t + self._slept)
-        told = self._all.record_failure(self._who, fault, stop.message, self._slept)
-        self._ended = replace(told, slept=0)
-        return told
+        reply = self._all.record_failure(self._who, fault, stop.message, self._slept)
+        self._ended = replace(reply, slept=0)
+        return reply
 
     def _build_first_frame(self) -> dict[str, Any]:
         seed = RandomStream(self._seed, f"agent {self._who}").integer(0)
@@ -277,8 +281,8 @@ class AgentProcess(ResponderProcess):
             case {"kind": "error", "error": error}:
                 fault = build_error_fault(error, self._asked_at + self._slept, self._who)
                 # A RuntimeError reports the fault of another agent. Only the original cause is passed on.
-                why = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
-                return self._all.record_failure(self._who, fault, why, self._slept)
+                reason = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
+                return self._all.record_failure(self._who, fault, reason, self._slept)
             case {"kind": "other", "type": kind}:
                 sentence = f"the {self._who} returned {kind[:_LONGEST_TYPE]}, which no message can hold"
                 fault = self._build_protocol_fault(self._asked_at, sentence)

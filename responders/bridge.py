@@ -120,8 +120,8 @@ class Bridge:
         """Return a time-limit fault with the line that the program was waiting in. Other faults are unchanged."""
         if fault.verdict is not Verdict.TIME_LIMIT:
             return fault
-        place = self._child.stop_and_locate()
-        return replace(fault, line=place["line"], file=place["file"] or "")
+        location = self._child.stop_and_locate()
+        return replace(fault, line=location["line"], file=location["file"] or "")
 
     def collect_logged_data(self) -> LoggedData:
         """Return the data and images that the program has logged since the last call."""
@@ -164,9 +164,9 @@ class Bridge:
                 if len(self.notes) < _MOST_NOTES:
                     self.notes.append(describe_refusal("program", frame))
 
-    def _execute_actions(self, acts: Sequence[packets.Action]) -> None:
+    def _execute_actions(self, actions: Sequence[packets.Action]) -> None:
         drive = self.world.drive
-        for kind, number in acts:
+        for kind, number in actions:
             if type(kind) is packets.MotorCommand:
                 self._count_free_action()
                 port, set_point, command = kind
@@ -188,10 +188,10 @@ class Bridge:
         """Advance simulated time by ``units``. A tick due exactly at the end of the wait still runs."""
         self._free_acts = 0
         end = self.now + units
-        last = min(end, self._limit)
+        last_tick = min(end, self._limit)
         tick = self._spec.tick
         due = (self.world.clock + 1) * tick
-        while due <= last:
+        while due <= last_tick:
             self.now = due
             self._run_tick()
             due += tick
@@ -215,24 +215,24 @@ class Bridge:
         self._child.send({"t": self.now, "v": value}, self._arrived)
         self._arrived = []
 
-    def _read_sensor(self, what: str, lasts: int) -> None:
+    def _read_sensor(self, sensor: str, duration: int) -> None:
         """Send the value of every sensor, unless the child already has the readings of this tick."""
-        end = self.now + lasts
+        end = self.now + duration
         # A read that ends after the time limit is cut like any wait, even if the child already has the value.
-        known = end < self._told_until and end <= self._limit
-        if known:
+        is_known = end < self._told_until and end <= self._limit
+        if is_known:
             self._free_acts = 0
             self.now = end
         else:
-            self._advance(lasts)
+            self._advance(duration)
             self._values = self.world.collect_readings()
             self._entries = {}
             self._told_until = (self.world.clock + 1) * self._spec.tick
-        entry = self._entries.get(what)
+        entry = self._entries.get(sensor)
         if entry is None:
-            entry = self._entries[what] = self.chain.encode_without_time(what, format_reading(self._values[what]))
+            entry = self._entries[sensor] = self.chain.encode_without_time(sensor, format_reading(self._values[sensor]))
         self.chain.add_bytes(entry % end)
-        if not known:
+        if not is_known:
             self._send_readings()
 
     def _send_readings(self) -> None:
@@ -266,11 +266,11 @@ class Bridge:
     def _wait_for_state(self, frame: wire.Frame) -> None:
         """Check the condition at once, then every 10 ms. The wait times out when its limit is strictly exceeded."""
         wheel = self._look_up_wheel(frame["port"])
-        wanted = frame["state"] == "running"
-        began = self.now
-        while (wheel.state == "running") is not wanted:
+        should_run = frame["state"] == "running"
+        start = self.now
+        while (wheel.state == "running") is not should_run:
             self._advance(_READ_TIME)
-            if frame["timeout"] is not None and self.now - began > frame["timeout"]:
+            if frame["timeout"] is not None and self.now - start > frame["timeout"]:
                 self._reply(False)
                 return
         self._free_acts = 0
@@ -292,20 +292,20 @@ class Bridge:
 
     def _send_text(self, text: str) -> int:
         """Send ``text`` to the responder and queue its answer. Return the index of the message."""
-        sent = self.conversation.send(text, self.now)
-        for copy in range(sent.copies):
+        sent_text = self.conversation.send(text, self.now)
+        for copy in range(sent_text.copies):
             if self._responder is not None:
-                answer = self._responder.answer(sent.text, self.now, sent.message, self.collect_logged_data())
+                answer = self._responder.answer(sent_text.text, self.now, sent_text.message, self.collect_logged_data())
             else:
                 self._meter.charge_bytes(len(STAND_IN_PREFIX) + len(text))
-                answer = Answer(STAND_IN_PREFIX + sent.text)
-            self.conversation.record_answer(sent, copy, answer)
-        return sent.message
+                answer = Answer(STAND_IN_PREFIX + sent_text.text)
+            self.conversation.record_answer(sent_text, copy, answer)
+        return sent_text.message
 
     def _send_image(self) -> None:
         left, right = self.world.render_images()
         self._charge_output(len(left) + len(right), "sent images of")
-        where = self.world.left_footprint
+        position = self.world.left_footprint
         text = message_format.format_image_message(left, right)
         self._meter.charge_bytes(len(text) + len(left) + len(right))
         message = self._send_text(text)
@@ -317,15 +317,15 @@ class Bridge:
                 left,
                 right,
                 message,
-                self._spec.floor.find_label(where.x, where.y),
+                self._spec.floor.find_label(position.x, position.y),
                 self._spec.robot.left_light.diameter,
             )
         )
 
     def _log_image(self, text: str) -> None:
         sides = message_format.parse_logged_sides(text)
-        word = text.split(" ")[1] if " " in text else "undefined"
-        self.printed.append(TimedText(self.now / SECOND, f"{word} image data logged..."))
+        side_name = text.split(" ")[1] if " " in text else "undefined"
+        self.printed.append(TimedText(self.now / SECOND, f"{side_name} image data logged..."))
         images = dict(zip(("left", "right"), self.world.render_images(), strict=True))
         for side in sides:
             self._charge_output(len(images[side]), "logged images of")
@@ -343,11 +343,11 @@ class Bridge:
         length = len(text.split()) * 60 * SECOND // _WORDS_A_MINUTE
         self._said_until = max(self._said_until, self.now) + length
 
-    def _charge_output(self, size: int, did: str) -> None:
+    def _charge_output(self, size: int, deed: str) -> None:
         """Charge ``size`` to the program's output limit before the output is stored. Ends the trial at the limit."""
         self._output_left -= size
         if self._output_left < 0:
-            sentence = f"the program {did} more than {self._spec.program.output_bytes} bytes"
+            sentence = f"the program {deed} more than {self._spec.program.output_bytes} bytes"
             raise _TrialEnded(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
 
     def _note_place(self, number: float) -> None:
@@ -365,9 +365,9 @@ class Bridge:
             self._raise_never_waits(None, None)
 
     def _raise_never_waits(self, line: int | None, file: str | None) -> NoReturn:
-        where = "this loop never waits" if line is not None else "the program never waits"
+        subject = "this loop never waits" if line is not None else "the program never waits"
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
-        sentence = f"{where}, so the world cannot move"
+        sentence = f"{subject}, so the world cannot move"
         raise _TrialEnded(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
 
 

@@ -56,52 +56,52 @@ class TrialChannel:
             return 0
         return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 
-    def compute_arrivals(self, number: int, copy: int, sent: int, slept: int) -> tuple[int, ...]:
+    def compute_arrivals(self, number: int, copy: int, sent_at: int, slept: int) -> tuple[int, ...]:
         """Return the arrival times of the answer to one copy of text ``number``; empty if the answer is lost.
 
         Args:
             number: The number of the text among the robot's texts.
             copy: The copy of the text that is answered, from 0.
-            sent: When the text was sent, in units of simulated time.
+            sent_at: When the text was sent, in units of simulated time.
             slept: How long the responder slept before it answered, in the same units.
         """
         index = 16 + 16 * copy
         return tuple(
-            sent + slept + self._compute_delay(number, index + 4 * place)
+            sent_at + slept + self._compute_delay(number, index + 4 * place)
             for place in range(self.count_copies(number, index + 8))
         )
 
-    def compute_one_way_arrivals(self, number: int, sent: int, copies: int) -> tuple[int, ...]:
+    def compute_one_way_arrivals(self, number: int, sent_at: int, copies: int) -> tuple[int, ...]:
         """Return the arrival times of the copies of a text that needs no answer, sent to the other robot."""
-        return tuple(sent + self._compute_delay(number, 16 + 16 * copy) for copy in range(copies))
+        return tuple(sent_at + self._compute_delay(number, 16 + 16 * copy) for copy in range(copies))
 
     def corrupt_text(self, text: str, number: int, index: int = 0) -> str | None:
         """Return the corrupted form of ``text``, or None if it arrives unchanged.
 
         Corruption replaces one to three letters or digits after the prefix with others of the same kind.
         """
-        chance = self._corruption
-        if chance.uniform(number, index) >= self._channel.corruption:
+        corruption = self._corruption
+        if corruption.uniform(number, index) >= self._channel.corruption:
             return None
-        begin = text.find("::") + 2 if "::" in text else 0
-        places = [place for place in range(begin, len(text)) if _find_alphabet(text[place])]
+        start = text.find("::") + 2 if "::" in text else 0
+        places = [place for place in range(start, len(text)) if _find_alphabet(text[place])]
         if not places:
             return None
         letters = list(text)
-        for turn in range(1 + chance.integer(number, index + 1) % _MAX_CHANGED_CHARACTERS):
-            place = places[chance.integer(number, index + 2 + 2 * turn) % len(places)]
-            others = _find_alphabet(text[place]).replace(text[place], "")
-            letters[place] = others[chance.integer(number, index + 3 + 2 * turn) % len(others)]
+        for turn in range(1 + corruption.integer(number, index + 1) % _MAX_CHANGED_CHARACTERS):
+            place = places[corruption.integer(number, index + 2 + 2 * turn) % len(places)]
+            alternatives = _find_alphabet(text[place]).replace(text[place], "")
+            letters[place] = alternatives[corruption.integer(number, index + 3 + 2 * turn) % len(alternatives)]
         return "".join(letters)
 
-    def corrupt_answer(self, text: str, number: int, copy: int, place: int) -> str | None:
-        """Return the corrupted form of an answer to a copy of text ``number``, or None. ``place`` counts duplicates."""
-        return self.corrupt_text(text, number, 16 + 16 * copy + 8 * place)
+    def corrupt_answer(self, text: str, number: int, copy: int, index: int) -> str | None:
+        """Return the corrupted form of an answer to a copy of text ``number``, or None. ``index`` counts duplicates."""
+        return self.corrupt_text(text, number, 16 + 16 * copy + 8 * index)
 
     def _compute_delay(self, number: int, index: int) -> int:
         seconds = self._channel.delay + self._channel.jitter * self._chance.uniform(number, index)
-        held_back = self._chance.uniform(number, index + 1) < self._channel.reordering
-        return round(seconds * SECOND) + (_REORDERING_DELAY if held_back else 0)
+        is_reordered = self._chance.uniform(number, index + 1) < self._channel.reordering
+        return round(seconds * SECOND) + (_REORDERING_DELAY if is_reordered else 0)
 
 
 def _find_alphabet(character: str) -> str:

@@ -73,54 +73,60 @@ class Conversation:
             angle=contact.angle,
             arrived_as=corrupted,
         )
-        sent = SentText(len(self.messages), self._texts, now, message.received, copies)
+        sent_text = SentText(len(self.messages), self._texts, now, message.received, copies)
         self.messages.append(message)
         self._texts += 1
         self._chain.add("message", now, text.encode())
         self._chain_channel_effects(now, contact, corrupted)
-        return sent
+        return sent_text
 
-    def record_answer(self, sent: SentText, copy: int, answer: Answer) -> None:
+    def record_answer(self, sent_text: SentText, copy: int, answer: Answer) -> None:
         """Record the responder's answer to one copy of a text and schedule its arrival."""
         if answer.fault is not None:
             self.faults.append(answer.fault)
         if answer.text is None:
             return
-        arrivals = self._channel.compute_arrivals(sent.number, copy, sent.t, answer.slept)
-        said = Message((sent.t + answer.slept) / SECOND, "responder", answer.text, None, sent.message, answer.note)
+        arrivals = self._channel.compute_arrivals(sent_text.number, copy, sent_text.t, answer.slept)
+        message = Message(
+            (sent_text.t + answer.slept) / SECOND, "responder", answer.text, None, sent_text.message, answer.note
+        )
         if not arrivals:
-            self.messages.append(replace(said, note=said.note or "lost", lost="chance"))
-        for place, due in enumerate(arrivals):
-            corrupted = self._channel.corrupt_answer(answer.text, sent.number, copy, place)
+            self.messages.append(replace(message, note=message.note or "lost", lost="chance"))
+        for duplicate, due in enumerate(arrivals):
+            corrupted = self._channel.corrupt_answer(answer.text, sent_text.number, copy, duplicate)
             entry = answer.entry if corrupted is None or answer.entry is None else _parse_queue_entry(corrupted)
             heapq.heappush(self._under_way, (due, len(self.messages), _AnswerInTransit(entry, corrupted)))
-            self.messages.append(replace(said, note=said.note or ("duplicated" if place else "")))
+            self.messages.append(replace(message, note=message.note or ("duplicated" if duplicate else "")))
 
-    def pass_on(self, sent: SentText, entry: str | None, other: Conversation) -> tuple[int, ...]:
+    def pass_on(self, sent_text: SentText, entry: str | None, receiver: Conversation) -> tuple[int, ...]:
         """Send a text of this robot to the other robot. Return the indices of its copies in the other's messages.
 
         ``entry`` is the entry for the other robot's queue, as JSON.
         """
-        message = self.messages[sent.message]
-        self.messages[sent.message] = replace(message, delivered=None, to_partner=True)
-        first = len(other.messages)
-        for copy, due in enumerate(self._channel.compute_one_way_arrivals(sent.number, sent.t, sent.copies)):
-            heapq.heappush(other._under_way, (due, len(other.messages), _AnswerInTransit(entry, message.arrived_as)))
+        message = self.messages[sent_text.message]
+        self.messages[sent_text.message] = replace(message, delivered=None, to_partner=True)
+        first = len(receiver.messages)
+        for copy, due in enumerate(
+            self._channel.compute_one_way_arrivals(sent_text.number, sent_text.t, sent_text.copies)
+        ):
+            heapq.heappush(
+                receiver._under_way, (due, len(receiver.messages), _AnswerInTransit(entry, message.arrived_as))
+            )
             note = "duplicated" if copy else ""
-            other.messages.append(Message(sent.t / SECOND, "partner", message.text, None, note=note))
-        return tuple(range(first, len(other.messages)))
+            receiver.messages.append(Message(sent_text.t / SECOND, "partner", message.text, None, note=note))
+        return tuple(range(first, len(receiver.messages)))
 
     def deliver(self, now: int) -> list[str]:
         """Deliver everything that is due by ``now``, in order. Return the queue entries for the robot, as JSON.
 
         Answers that are due while the robot is out of reach of the link are lost.
         """
-        arrived = []
+        entries = []
         while self._under_way and self._under_way[0][0] <= now:
             _, index, under_way = heapq.heappop(self._under_way)
             if self._deliver_message(index, now, under_way.corrupted) and under_way.entry is not None:
-                arrived.append(under_way.entry)
-        return arrived
+                entries.append(under_way.entry)
+        return entries
 
     def finish(self) -> None:
         """Mark answers still in transit as undelivered, because the program has ended."""

@@ -40,26 +40,26 @@ def to_child_data_error(error: Exception) -> ChildDataError:
     return ChildDataError(error)
 
 
-def build_stop_fault(stop: ChildStopped, who: str, now: int) -> Fault:
+def build_stop_fault(stop: ChildStopped, process_name: str, now: int) -> Fault:
     """Return the fault of a child that was stopped or ended at ``now``, in units of simulated time.
 
-    ``who`` is the program, the responder, or the name of an agent, as in the functions below.
+    ``process_name`` is the program, the responder, or the name of an agent, as in the functions below.
     """
     verdict = stop.verdict
-    if who != "program" and verdict is Verdict.PROGRAM_ERROR:
+    if process_name != "program" and verdict is Verdict.PROGRAM_ERROR:
         verdict = Verdict.RESPONDER_ERROR
     cause = stop.cause if isinstance(stop, ChildDataError) else ""
-    sentence = f"the {who} was stopped: {stop.message}"
-    return _build_fault(now, verdict, who, sentence, stop.line, staff=cause, file=stop.file or "")
+    sentence = f"the {process_name} was stopped: {stop.message}"
+    return _build_fault(now, verdict, process_name, sentence, stop.line, staff=cause, file=stop.file or "")
 
 
 #: Start of the message for a responder that returns something other than a text.
 _WRONG_RETURN = "the responder returned "
 
 
-def describe_wrong_return(what: str) -> str:
-    """Return the message for a responder that returned ``what`` instead of a text."""
-    return f"{_WRONG_RETURN}{what}"
+def describe_wrong_return(description: str) -> str:
+    """Return the message for a responder that returned ``description`` instead of a text."""
+    return f"{_WRONG_RETURN}{description}"
 
 
 def is_wrong_return(fault: Fault) -> bool:
@@ -71,38 +71,42 @@ def is_wrong_return(fault: Fault) -> bool:
     return fault.verdict is Verdict.PROTOCOL_ERROR and fault.message.startswith(_WRONG_RETURN)
 
 
-def build_error_fault(error: Mapping[str, Any], now: int, who: str) -> Fault:
+def build_error_fault(error: Mapping[str, Any], now: int, process_name: str) -> Fault:
     """Return the fault for an exception that a child reported. Running out of memory counts as a limit."""
-    out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
-    if error["type"] == "MemoryError" or out_of_memory:
-        sentence = f"the {who} asked for more memory than it may have"
-        return _build_fault(now, Verdict.MEMORY_LIMIT, who, sentence, error["line"], file=error["file"] or "")
-    verdict = Verdict.PROGRAM_ERROR if who == "program" else Verdict.RESPONDER_ERROR
-    words = error["text"]
-    sentence = f"{error['type']}: {words}" if words else str(error["type"])
+    is_out_of_memory = error["type"] == "OSError" and error["text"].startswith(f"[Errno {errno.ENOMEM}]")
+    if error["type"] == "MemoryError" or is_out_of_memory:
+        sentence = f"the {process_name} asked for more memory than it may have"
+        return _build_fault(now, Verdict.MEMORY_LIMIT, process_name, sentence, error["line"], file=error["file"] or "")
+    verdict = Verdict.PROGRAM_ERROR if process_name == "program" else Verdict.RESPONDER_ERROR
+    text = error["text"]
+    sentence = f"{error['type']}: {text}" if text else str(error["type"])
     hint = error.get("hint", "")[:_LONGEST_HINT]
-    if error["type"] == "SyntaxError" and words.startswith(_PYTHON_2):
+    if error["type"] == "SyntaxError" and text.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
-    return _build_fault(now, verdict, who, sentence, error["line"], hint, file=error["file"] or "")
+    return _build_fault(now, verdict, process_name, sentence, error["line"], hint, file=error["file"] or "")
 
 
-def describe_refusal(who: str, frame: wire.Frame) -> str:
+def describe_refusal(process_name: str, frame: wire.Frame) -> str:
     """Return the report's sentence about an operation that the sandbox refused."""
-    where = f"line {frame['line']} of {frame['file'] or f'the {who}'}" if frame["line"] is not None else f"the {who}"
-    return f"{where}: {frame['what'][:200]}"
+    location = (
+        f"line {frame['line']} of {frame['file'] or f'the {process_name}'}"
+        if frame["line"] is not None
+        else f"the {process_name}"
+    )
+    return f"{location}: {frame['what'][:200]}"
 
 
 def _build_fault(
     now: int,
     verdict: Verdict,
-    who: str,
+    process_name: str,
     sentence: str,
     line: int | None,
     hint: str = "",
     staff: str = "",
     file: str = "",
 ) -> Fault:
-    if who == "program":
+    if process_name == "program":
         return Fault(now / SECOND, verdict, "program", sentence, line, hint, staff=staff, file=file)
-    agent = "" if who == "responder" else who
+    agent = "" if process_name == "responder" else process_name
     return Fault(now / SECOND, verdict, "responder", sentence, line, hint, staff=staff, agent=agent, file=file)

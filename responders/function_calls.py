@@ -74,7 +74,7 @@ def call_functions(
     sandboxes: Sandboxes,
     seed: int,
     meter: JobMeter,
-    ran: ExecutedStatements | None = None,
+    executed_statements: ExecutedStatements | None = None,
 ) -> CallResults:
     """Load ``code`` with ``files`` in its folder and make the calls.
 
@@ -87,24 +87,24 @@ def call_functions(
         sandboxes: Starts the child.
         seed: Seed for the child.
         meter: Counts the costs of the job.
-        ran: Collects the executed statements, if given.
+        executed_statements: Collects the executed statements, if given.
 
     Raises:
         HostError: If the machine fails, not the module.
     """
     with sandboxes.open_private_folder() as folder:
-        spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER, ran)
+        spec = ResponderSpec(code, files, limits, output_bytes, _NO_RESPONDER, executed_statements)
         caller = _CallProcess(spec, sandboxes, folder, seed, meter)
         try:
             sandbox = caller.sandbox
             fault = caller.load()
             printed, notes = [caller.take_output()], [tuple(caller.notes)]
-            gave = []
+            results = []
             for call in calls if fault is None else ():
-                gave.append(caller.call_function(call))
+                results.append(caller.call_function(call))
                 printed.append(caller.take_output())
                 notes.append(tuple(caller.notes))
-            return CallResults(tuple(gave), fault, sandbox, tuple(printed), tuple(notes))
+            return CallResults(tuple(results), fault, sandbox, tuple(printed), tuple(notes))
         finally:
             caller.close()
 

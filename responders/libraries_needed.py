@@ -43,8 +43,8 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
         texts = (text, *(data.decode() for data in modules.values()))
     except UnicodeDecodeError:
         return True
-    known = {*modules, *STANDARD_MODULES, *_LOADED_MODULES}
-    return any((imported := _find_imports(each)) is None or not known.issuperset(imported) for each in texts)
+    known_modules = {*modules, *STANDARD_MODULES, *_LOADED_MODULES}
+    return any((imported := _find_imports(each)) is None or not known_modules.issuperset(imported) for each in texts)
 
 
 def build_notebook_source(cells: tuple[str, ...]) -> str:

@@ -66,14 +66,14 @@ class InfraredLink:
         dx, dy = x - pose.x, y - pose.y
         distance = round(math.hypot(dx, dy), _DECIMALS)
         angle = round(math.degrees(math.atan2(cosine * dy - sine * dx, cosine * dx + sine * dy)), _DECIMALS)
-        lost: LossReason = ""
+        loss_reason: LossReason = ""
         if distance > channel.range:
-            lost = "out of range"
+            loss_reason = "out of range"
         elif abs(angle) > channel.facing / 2:
-            lost = "facing away"
+            loss_reason = "facing away"
         elif channel.blocked_by == "obstacles" and self._arena.is_blocked_between((pose.x, pose.y), (x, y)):
-            lost = "blocked"
-        return Contact(lost, distance, angle)
+            loss_reason = "blocked"
+        return Contact(loss_reason, distance, angle)
 
 
 def build_link(channel: Channel, arena: Arena, robot: Callable[[], Pose]) -> ChannelLink:

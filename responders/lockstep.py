@@ -64,42 +64,44 @@ class PairedBridge(Bridge):
         """Set the delivery time of each text that went to the partner. Call it after both programs have ended."""
         messages = self.conversation.messages
         for index, copies in self._passed_on:
-            heard = [self.partner.conversation.messages[copy] for copy in copies]
-            delivered = min((copy.delivered for copy in heard if copy.delivered is not None), default=None)
+            partner_messages = [self.partner.conversation.messages[copy] for copy in copies]
+            delivered = min((copy.delivered for copy in partner_messages if copy.delivered is not None), default=None)
             message = replace(messages[index], delivered=delivered)
-            if delivered is None and heard:
-                message = replace(message, note=message.note or heard[0].note, lost=heard[0].lost)
+            if delivered is None and partner_messages:
+                message = replace(message, note=message.note or partner_messages[0].note, lost=partner_messages[0].lost)
             messages[index] = message
 
     def _run_tick(self) -> None:
         """Run one tick. Errors that a program causes in our own code occur in its own turn and count as its fault."""
         _wait_for_partner()
         self.take_arrivals()
-        moved = self.world.move()
+        movement = self.world.move()
         drive = self.world.drive
         self.partner.arena.place_partner(drive.x, drive.y, drive.heading)
         _wait_for_partner()
-        self.world.sense(moved)
+        self.world.sense(movement)
 
     def _send_text(self, text: str) -> int:
-        sent = self.conversation.send(text, self.now)
+        sent_text = self.conversation.send(text, self.now)
         if self._spec.responder is None:
-            self._pass_on(text, sent)
-        elif sent.copies:
-            self.questions.append(PendingText(sent, self.collect_logged_data()))
-        return sent.message
+            self._pass_on(text, sent_text)
+        elif sent_text.copies:
+            self.questions.append(PendingText(sent_text, self.collect_logged_data()))
+        return sent_text.message
 
-    def _pass_on(self, text: str, sent: SentText) -> None:
+    def _pass_on(self, text: str, sent_text: SentText) -> None:
         entry = None
         try:
             entry = message_format.format_partner_entry(text)
         except ValueError as error:
             sentence = f"the text begins with PY::JSON:: but is not JSON: {error}"
             self.conversation.faults.append(Fault(self.now / SECOND, Verdict.PROTOCOL_ERROR, "program", sentence))
-        if entry is not None and sent.text != text:
-            entry = _parse_partner_entry(sent.text)
-        self._meter.charge_bytes(sent.copies * (len(text) + len(entry or "")))
-        self._passed_on.append((sent.message, self.conversation.pass_on(sent, entry, self.partner.conversation)))
+        if entry is not None and sent_text.text != text:
+            entry = _parse_partner_entry(sent_text.text)
+        self._meter.charge_bytes(sent_text.copies * (len(text) + len(entry or "")))
+        self._passed_on.append(
+            (sent_text.message, self.conversation.pass_on(sent_text, entry, self.partner.conversation))
+        )
 
 
 FaultPair = tuple[Fault | None, Fault | None]
@@ -152,14 +154,14 @@ def _parse_partner_entry(corrupted: str) -> str | None:
 
 def _answer_pending_texts(responder: ResponderProcess, bridges: Sequence[PairedBridge]) -> None:
     """Answer the texts that both robots have sent since the last tick, in the order they were sent."""
-    asked = [(bridge, question) for bridge in bridges for question in bridge.questions]
-    for bridge, question in sorted(asked, key=lambda each: each[1].sent.t):
-        sent, logged = question.sent, question.collected
-        for copy in range(sent.copies):
-            before = len(responder.calls)
-            answer = responder.answer(sent.text, sent.t, sent.message, logged, bridge.number)
-            bridge.calls += responder.calls[before:]
-            bridge.conversation.record_answer(sent, copy, answer)
+    questions = [(bridge, question) for bridge in bridges for question in bridge.questions]
+    for bridge, question in sorted(questions, key=lambda each: each[1].sent.t):
+        sent_text, logged = question.sent, question.collected
+        for copy in range(sent_text.copies):
+            call_count = len(responder.calls)
+            answer = responder.answer(sent_text.text, sent_text.t, sent_text.message, logged, bridge.number)
+            bridge.calls += responder.calls[call_count:]
+            bridge.conversation.record_answer(sent_text, copy, answer)
             logged = LoggedData()
     for bridge in bridges:
         bridge.questions.clear()

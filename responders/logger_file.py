@@ -17,7 +17,7 @@ LOG_FILE = "logger.txt"
 _LOG_BYTES = 1 << 20
 
 
-def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str, Fault | None]:
+def read_log(folder: Path, meter: JobMeter, process_name: str = "responder") -> tuple[str, Fault | None]:
     """Return the content of logger.txt in the folder of an ended process, and the fault if it is unreadable.
 
     Only a regular file is read, never a link. The size is capped and charged to the meter.
@@ -36,5 +36,5 @@ def read_log(folder: Path, meter: JobMeter, who: str = "responder") -> tuple[str
     try:
         meter.charge_bytes(len(data))
     except ChildStopped as stop:
-        return "", build_stop_fault(stop, who, 0)
+        return "", build_stop_fault(stop, process_name, 0)
     return data.decode("utf-8", "replace"), None

@@ -52,10 +52,10 @@ def format_image_message(left: bytes, right: bytes) -> str:
 def parse_logged_sides(text: str) -> tuple[Literal["left", "right"], ...]:
     """Return the sensors that ``image_data left|right|both`` logs."""
     words = text.split(" ")
-    which = words[1] if len(words) > 1 else ""
-    if which == "both":
+    side = words[1] if len(words) > 1 else ""
+    if side == "both":
         return ("left", "right")
-    return (which,) if which in ("left", "right") else ()  # type: ignore[return-value]
+    return (side,) if side in ("left", "right") else ()  # type: ignore[return-value]
 
 
 def parse_datum(text: str, t: float) -> DatalogEntry | None:
@@ -122,5 +122,5 @@ def format_partner_entry(text: str) -> str:
     """
     if text.startswith(IMG_DATA):
         return text.removeprefix(f"{IMG_DATA}::")
-    said = text.removeprefix(PY)
-    return format_queue_entry(said) if said.startswith(JSON) else json.dumps(said)
+    content = text.removeprefix(PY)
+    return format_queue_entry(content) if content.startswith(JSON) else json.dumps(content)

@@ -138,7 +138,7 @@ def execute_notebook(
             execution.finish()
         finally:
             process.close()
-        log, unread = read_log(folder, meter)
+        log, log_fault = read_log(folder, meter)
         runs = execution.runs
         if agents is not None:
             agents.finish()
@@ -150,7 +150,7 @@ def execute_notebook(
         (*process.notes, *(agents.notes if agents is not None else ())),
         process.sandbox,
         tuple(process.raised),
-        process.stopped or unread,
+        process.stopped or log_fault,
     )
 
 
@@ -209,11 +209,11 @@ class _Execution:
     @contextlib.contextmanager
     def _charged(self) -> Iterator[None]:
         """Charge the worker's processor time to the job, except the free seconds and the marked run."""
-        began = time.thread_time() - self._marked_cpu
+        start = time.thread_time() - self._marked_cpu
         try:
             yield
         finally:
-            spent = time.thread_time() - self._marked_cpu - began
+            spent = time.thread_time() - self._marked_cpu - start
             self._meter.charge_cpu(max(0.0, spent - self._free_cpu))
             self._free_cpu = max(0.0, self._free_cpu - spent)
 
@@ -222,85 +222,87 @@ class _Execution:
             return {"do": "state", "state": self._build_state()}
         cell, line = self._process.locate_line(frame["line"])
         call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
-        planned = self._planner.plan_call(call)
-        for note in planned.notes:
+        planned_run = self._planner.plan_call(call)
+        for note in planned_run.notes:
             self._process.add_note(frame["line"], note)
-        if planned.spec is None:
+        if planned_run.spec is None:
             return _build_done_frame()
-        refusal = self._describe_refusal(planned, planned.spec)
+        refusal = self._describe_refusal(planned_run, planned_run.spec)
         if refusal:
             self._process.add_note(frame["line"], refusal)
             return _build_done_frame()
-        bridge = self._run_robot(cell, planned, planned.spec)
+        bridge = self._run_robot(cell, planned_run, planned_run.spec)
         logged = bridge.collect_logged_data()
-        return _build_done_frame(bridge.now, logged.data, logged.images, build_robot_state(bridge.world, planned.spec))
+        return _build_done_frame(
+            bridge.now, logged.data, logged.images, build_robot_state(bridge.world, planned_run.spec)
+        )
 
     def _build_state(self) -> dict[str, Any]:
-        standing = self._planner.plan_standstill()
-        assert standing.spec is not None
-        ground = self._ground(standing.spec, standing.obstacles)
-        return build_robot_state(build_world(standing.spec, *ground, HashChain()), standing.spec)
+        standstill = self._planner.plan_standstill()
+        assert standstill.spec is not None
+        ground = self._ground(standstill.spec, standstill.obstacles)
+        return build_robot_state(build_world(standstill.spec, *ground, HashChain()), standstill.spec)
 
     def finish(self) -> None:
         """Make the planner's final run. Add a hint to runs whose responder was defined too late."""
-        since, missing = self._process.answers_since, self._missing
-        if since is not None and missing is not None:
-            self.runs = [_add_order_hint(run, missing, since) if run.marked else run for run in self.runs]
-        planned = self._planner.plan_last_run()
-        if planned.spec is not None:
-            self._run_robot(None, planned, planned.spec)
+        cell_number, missing_message = self._process.answers_since, self._missing
+        if cell_number is not None and missing_message is not None:
+            self.runs = [_add_order_hint(run, missing_message, cell_number) if run.marked else run for run in self.runs]
+        planned_run = self._planner.plan_last_run()
+        if planned_run.spec is not None:
+            self._run_robot(None, planned_run, planned_run.spec)
 
-    def _describe_refusal(self, planned: PlannedRun, spec: TrialSpec) -> str:
-        if planned.marked:
+    def _describe_refusal(self, planned_run: PlannedRun, spec: TrialSpec) -> str:
+        if planned_run.marked:
             return ""
         if len(self.runs) >= _MOST_RUNS:
             return f"the robot was not started: a notebook may start it {_MOST_RUNS} times"
-        too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * spec.seconds)
-        if too_long or self._unmarked_cpu > _UNMARKED_CPU_FACTOR * spec.program.limits.cpu_seconds:
+        is_too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * spec.seconds)
+        if is_too_long or self._unmarked_cpu > _UNMARKED_CPU_FACTOR * spec.program.limits.cpu_seconds:
             return "the robot was not started: the runs before have used up the time for runs that are not marked"
         return ""
 
-    def _run_robot(self, cell: int | None, planned: PlannedRun, spec: TrialSpec) -> Bridge:
+    def _run_robot(self, cell: int | None, planned_run: PlannedRun, spec: TrialSpec) -> Bridge:
         process = self._process
-        printed = len("\n".join(process.output))
-        if planned.needs_responder:
+        output_length = len("\n".join(process.output))
+        if planned_run.needs_responder:
             self._missing = process.missing
-        answers = spec.collaborative and (process.missing is None or planned.needs_responder)
+        is_answering = spec.collaborative and (process.missing is None or planned_run.needs_responder)
         first_call = len(process.calls)
-        since = self._agents.count_events() if self._agents is not None else AgentCounts()
-        arena, camera = self._ground(spec, planned.obstacles)
+        earlier_counts = self._agents.count_events() if self._agents is not None else AgentCounts()
+        arena, camera = self._ground(spec, planned_run.obstacles)
         program = self._sandboxes.spawn(spec.program.role, spec.program.limits, meter=self._meter)
-        began = time.thread_time()
+        start = time.thread_time()
         try:
-            bridge = Bridge(spec, arena, camera, program, process if answers else None, self._meter)
+            bridge = Bridge(spec, arena, camera, program, process if is_answering else None, self._meter)
             fault = bridge.run()
-            if not planned.marked:
+            if not planned_run.marked:
                 self._unmarked_cpu += program.measure_cpu_seconds()
                 self._unmarked_seconds += bridge.now / SECOND
         finally:
             program.close()
-            if planned.marked:
-                self._marked_cpu += time.thread_time() - began
+            if planned_run.marked:
+                self._marked_cpu += time.thread_time() - start
         bridge.conversation.finish()
         if self._agents is not None:
             self._agents.seal(bridge.chain, bridge.now)
         faults = [*bridge.conversation.faults, *([fault] if fault else [])]
-        if planned.needs_responder and process.missing is not None and not bridge.conversation.faults:
+        if planned_run.needs_responder and process.missing is not None and not bridge.conversation.faults:
             faults.append(
                 Fault(
                     0.0, Verdict.RESPONDER_ERROR, "responder", process.missing, hint=self._explain_missing_responder()
                 )
             )
-        faults = [self._locate_fault(each, planned.program_cell) for each in faults]
+        faults = [self._locate_fault(each, planned_run.program_cell) for each in faults]
         # Loading faults of agents count in every run, other faults only in the run where they occur.
-        faults += [] if self._agents is None else self._agents.collect_faults_since(since)
+        faults += [] if self._agents is None else self._agents.collect_faults_since(earlier_counts)
         faults.sort(key=lambda each: each.t)
         recording = build_recording(spec, bridge, tuple(faults), program.sandbox)
-        calls = [replace(call, before=call.before - since.messages) for call in process.calls[first_call:]]
+        calls = [replace(call, before=call.before - earlier_counts.messages) for call in process.calls[first_call:]]
         recording = replace(recording, calls=tuple(calls))
         if self._agents is not None:
-            recording = self._agents.add_messages_and_calls(recording, since)
-        self.runs.append(NotebookRun(cell, planned.marked, recording, printed))
+            recording = self._agents.add_messages_and_calls(recording, earlier_counts)
+        self.runs.append(NotebookRun(cell, planned_run.marked, recording, output_length))
         self._planner.record_run(recording)
         return bridge
 
@@ -313,16 +315,18 @@ class _Execution:
         """Return the message of the first failed cell, a possible reason for the missing responder, or ""."""
         if not self._process.raised:
             return ""
-        first = self._process.raised[0]
-        return f"In {first.place}: {first.message}"
+        first_error = self._process.raised[0]
+        return f"In {first_error.place}: {first_error.message}"
 
 
-def _add_order_hint(run: NotebookRun, missing: str, since: int) -> NotebookRun:
-    """Return the run with a hint to the cell that defines the responder, in place of the ``missing`` message."""
-    message = f"the responder is defined in cell {since}, after the robot of cell {run.cell} has run"
-    hint = f"Move cell {since} above cell {run.cell}."
+def _add_order_hint(run: NotebookRun, missing_message: str, cell_number: int) -> NotebookRun:
+    """Return the run with a hint to the cell that defines the responder, in place of ``missing_message``."""
+    message = f"the responder is defined in cell {cell_number}, after the robot of cell {run.cell} has run"
+    hint = f"Move cell {cell_number} above cell {run.cell}."
     faults = tuple(
-        replace(fault, message=message, hint=hint) if fault.who == "responder" and missing in fault.message else fault
+        replace(fault, message=message, hint=hint)
+        if fault.who == "responder" and missing_message in fault.message
+        else fault
         for fault in run.recording.faults
     )
     return replace(run, recording=replace(run.recording, faults=faults))

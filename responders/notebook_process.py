@@ -123,14 +123,14 @@ class NotebookProcess(ResponderProcess):
     def add_note(self, line: int | None, sentence: str, file: str | None = None) -> None:
         """Keep a note for the report with its place. ``file`` is a file beside the notebook."""
         cell, number = self.locate_line(line) if file is None else (self._cell, line)
-        where = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
-        self._add_note(f"{where}{f' of {file}' if file else ''}: {sentence}")
+        location = f"cell {cell}" if number is None else f"cell {cell}, line {number}"
+        self._add_note(f"{location}{f' of {file}' if file else ''}: {sentence}")
 
     def _note_skipped_cells(self) -> None:
         first, last = self._cell + 1, len(self._notebook.cells)
         if self.stopped is not None and first <= last:
-            which = f"cell {last} was" if first == last else f"cells {first} to {last} were"
-            self._add_note(f"{which} not run: the notebook was stopped in cell {self._cell}")
+            subject = f"cell {last} was" if first == last else f"cells {first} to {last} were"
+            self._add_note(f"{subject} not run: the notebook was stopped in cell {self._cell}")
 
     def _accept_cell_frame(self, frame: wire.Frame, perform: Callable[[wire.Frame], dict[str, Any]]) -> None:
         # Each costs output, so a process can't send them without limit.
@@ -157,9 +157,9 @@ class NotebookProcess(ResponderProcess):
             case _:
                 self._accept_frame(frame)
 
-    def _record_answering(self, answers: bool) -> None:
+    def _record_answering(self, is_answering: bool) -> None:
         """Record whether there is a responder after the cell that has just been executed."""
-        if not answers:
+        if not is_answering:
             self.answers_since = None
         elif self.answers_since is None:
             self.answers_since = self._cell

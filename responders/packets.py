@@ -58,8 +58,8 @@ _READ, _WAIT, _MOVE, _LINE = range(4)
 _MOST_LINES = 1 << 20
 
 
-def _encode_kind(what: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
-    return int.from_bytes((what, part, set_point, command), "little")
+def _encode_kind(action_code: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
+    return int.from_bytes((action_code, part, set_point, command), "little")
 
 
 #: All actions by code: kind, smallest and largest number, and whether the number must be whole.
@@ -95,21 +95,21 @@ def unpack_actions(packet: bytes) -> list[Action]:
     Raises:
         WireError: If an action is invalid.
     """
-    acts = []
+    actions = []
     for code, number in _ACTION.iter_unpack(packet[HEADER_BYTES:]):
-        known = _KINDS_BY_CODE.get(code)
-        if known is None:
+        kind_limits = _KINDS_BY_CODE.get(code)
+        if kind_limits is None:
             raise WireError("an act that there is not")
-        kind, least, most, whole = known
-        if not least <= number <= most or (whole and number % 1):
+        kind, minimum, maximum, is_whole = kind_limits
+        if not minimum <= number <= maximum or (is_whole and number % 1):
             raise WireError("an act that there is not")
-        acts.append((kind, number))
-    return acts
+        actions.append((kind, number))
+    return actions
 
 
-def unpack_lines(place: float) -> tuple[int, int]:
+def unpack_lines(line_pair: float) -> tuple[int, int]:
     """Return the innermost and the outermost line in the number of a place."""
-    outer, inner = divmod(int(place), _MOST_LINES)
+    outer, inner = divmod(int(line_pair), _MOST_LINES)
     return inner, outer
 
 

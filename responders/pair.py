@@ -38,8 +38,8 @@ def run_pair(
         HostError: If the machine fails, not the student's code.
     """
     specs = spec, spec.build_partner_spec(partner)
-    for arena, other in zip(arenas, reversed(specs), strict=True):
-        arena.place_partner(other.pose.x, other.pose.y, math.radians(other.pose.heading))
+    for arena, other_spec in zip(arenas, reversed(specs), strict=True):
+        arena.place_partner(other_spec.pose.x, other_spec.pose.y, math.radians(other_spec.pose.heading))
     with sandboxes.open_private_folder() as folder:
         with ExitStack() as children:
             responder = None
@@ -47,29 +47,31 @@ def run_pair(
                 responder = ResponderProcess(spec.responder, sandboxes, folder, spec.child_seed, meter)
                 children.callback(responder.close)
             bridges, layers = [], []
-            for each, arena in zip(specs, arenas, strict=True):
-                program = sandboxes.spawn(each.program.role, each.program.limits, meter=meter)
+            for robot_spec, arena in zip(specs, arenas, strict=True):
+                program = sandboxes.spawn(robot_spec.program.role, robot_spec.program.limits, meter=meter)
                 children.callback(program.close)
-                bridges.append(PairedBridge(each, arena, camera, program, meter))
+                bridges.append(PairedBridge(robot_spec, arena, camera, program, meter))
                 layers.append(program.sandbox)
-            unloadable = responder.load() if responder is not None else None
+            loading_fault = responder.load() if responder is not None else None
             first, second = bridges
-            cut, partner_cut = serve_both(first, second, responder)
-        log, unread = read_log(folder, meter) if responder is not None else ("", None)
+            first_fault, second_fault = serve_both(first, second, responder)
+        log, log_fault = read_log(folder, meter) if responder is not None else ("", None)
     for bridge in bridges:
         bridge.conversation.finish()
     for bridge in bridges:
         bridge.set_delivery_times()
-    own = _sort_faults((unloadable, *first.conversation.faults, cut, unread))
-    others = (
-        _attribute_to_second(fault, partner) for fault in _sort_faults((*second.conversation.faults, partner_cut))
+    first_faults = _sort_faults((loading_fault, *first.conversation.faults, first_fault, log_fault))
+    second_faults = (
+        _attribute_to_second(fault, partner) for fault in _sort_faults((*second.conversation.faults, second_fault))
     )
-    partners = build_recording(specs[1], second, tuple(fault for fault in others if fault is not None), layers[1])
-    first.chain.add("partner", second.now, partners.sha256.encode())
+    partner_recording = build_recording(
+        specs[1], second, tuple(fault for fault in second_faults if fault is not None), layers[1]
+    )
+    first.chain.add("partner", second.now, partner_recording.sha256.encode())
     recording = replace(
-        build_recording(spec, first, own, layers[0]),
+        build_recording(spec, first, first_faults, layers[0]),
         calls=tuple(first.calls),
-        partner=replace(partners, calls=tuple(second.calls)),
+        partner=replace(partner_recording, calls=tuple(second.calls)),
     )
     if responder is None:
         return recording

@@ -63,7 +63,7 @@ class ReplayDiverged(RobomarkError):
 
 @dataclass(slots=True)
 class _ChildRecording:
-    """The recorded input and output of one child, in order. ``whole`` is False if it grew too large."""
+    """The recorded input and output of one child, in order. ``is_complete`` is False if it grew too large."""
 
     first: wire.Frame
     sandbox: str
@@ -108,10 +108,10 @@ class FaultReplay:
         self, role: str, folder: Path | None, meter: JobMeter | None, spawn: Callable[[], Child]
     ) -> ServedChild:
         """Return a child of this role: a real one from ``spawn``, recorded or not, or a replayed one."""
-        spared = (
+        is_spared = (
             self._last is not None and role.startswith(_find_role(self._last)) and self._misses < _MAX_FAILED_REPLAYS
         )
-        if not spared or meter is None or self._diverged:
+        if not is_spared or meter is None or self._diverged:
             return spawn()
         if self._known:
             return _ReplayedChild(self._known, folder, meter, spawn, self._record_replay)
@@ -119,9 +119,9 @@ class FaultReplay:
 
     def record_trial(self, recording: Recording) -> Recording:
         """Record that a trial has ended. Return its recording, with a note if a child was replayed."""
-        fault, by_heart = _find_costly_fault(recording.faults), self._by_heart
+        fault, is_replayed = _find_costly_fault(recording.faults), self._by_heart
         self._by_heart = self._diverged = False
-        if by_heart and self._last is not None:
+        if is_replayed and self._last is not None:
             return replace(recording, notes=(*recording.notes, REPLAY_NOTES[_find_role(self._last)]))
         if not self._known and fault is not None and self._last is not None and _is_same_failure(fault, self._last):
             self._known = [part for part in self._heard if part.is_complete]
@@ -152,10 +152,10 @@ class _RecordedChild:
         self._spoke = 0.0  # processor seconds at its last frame
         self.sandbox = child.sandbox
 
-    def send(self, frame: wire.Frame, arrived: Sequence[str] = ()) -> None:
-        self._child.send(frame, arrived)
+    def send(self, frame: wire.Frame, entries: Sequence[str] = ()) -> None:
+        self._child.send(frame, entries)
         if self._part is not None:
-            self._part.add(_ChildInput(frame, tuple(arrived)), sum(map(len, arrived)) + len(str(frame)))
+            self._part.add(_ChildInput(frame, tuple(entries)), sum(map(len, entries)) + len(str(frame)))
         elif not self._begun and _is_independent(frame) and not _may_use_chance(frame, self._folder):
             self._part = _ChildRecording(_remove_seed(frame), self.sandbox)
             self._child.measured = True
@@ -167,22 +167,22 @@ class _RecordedChild:
             self._part.add(_ChildInput(_build_readings_frame(units, values), ()), 8 * len(values))
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
-        before = self._meter.spent.kept_bytes
-        said: wire.Frame | ChildStopped
+        earlier_bytes = self._meter.spent.kept_bytes
+        output: wire.Frame | ChildStopped
         try:
-            said = self._child.receive(schema)
+            output = self._child.receive(schema)
             if self._part is not None:
                 self._spoke = self._child.measure_cpu_seconds()
         except ChildStopped as stop:
-            said = stop
+            output = stop
             if self._part is not None and stop.verdict in _LIMIT_VERDICTS:
                 self._part.is_repeatable = self._child.outlasted and self._spoke < self._child.cpu_limit / 2
-        paid = self._meter.spent.kept_bytes - before
+        charged_bytes = self._meter.spent.kept_bytes - earlier_bytes
         if self._part is not None:
-            self._part.add(_ChildOutput(said, paid), paid)
-        if isinstance(said, ChildStopped):
-            raise said
-        return said
+            self._part.add(_ChildOutput(output, charged_bytes), charged_bytes)
+        if isinstance(output, ChildStopped):
+            raise output
+        return output
 
     def measure_cpu_seconds(self) -> float:
         return self._child.measure_cpu_seconds()
@@ -215,13 +215,13 @@ class _ReplayedChild:
         self._next = 0
         self.sandbox = parts[0].sandbox
 
-    def send(self, frame: wire.Frame, arrived: Sequence[str] = ()) -> None:
+    def send(self, frame: wire.Frame, entries: Sequence[str] = ()) -> None:
         if self._child is not None:
-            self._child.send(frame, arrived)
+            self._child.send(frame, entries)
         elif self._steps is None:
-            self._start_replay(frame, arrived)
+            self._start_replay(frame, entries)
         else:
-            self._compare_input(_ChildInput(frame, tuple(arrived)))
+            self._compare_input(_ChildInput(frame, tuple(entries)))
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         if self._child is not None:
@@ -255,18 +255,18 @@ class _ReplayedChild:
         if self._child is not None:
             self._child.close()
 
-    def _start_replay(self, frame: wire.Frame, arrived: Sequence[str]) -> None:
-        first = _remove_seed(frame)
-        self._steps = next((part.steps for part in self._parts if part.first == first), None)
+    def _start_replay(self, frame: wire.Frame, entries: Sequence[str]) -> None:
+        first_frame = _remove_seed(frame)
+        self._steps = next((part.steps for part in self._parts if part.first == first_frame), None)
         if self._steps is not None:
             self._tell()
             return
         self._child = self._spawn()
         self.sandbox = self._child.sandbox
-        self._child.send(frame, arrived)
+        self._child.send(frame, entries)
 
-    def _compare_input(self, told: _ChildInput) -> None:
-        if self._take_step() != told:
+    def _compare_input(self, child_input: _ChildInput) -> None:
+        if self._take_step() != child_input:
             raise ReplayDiverged("a child was told something new")
 
     def _take_step(self) -> _ChildInput | _ChildOutput | None:
@@ -287,11 +287,11 @@ def _find_role(fault: Fault) -> str:
     return "responder" if fault.who == "responder" else "robot"
 
 
-def _is_same_failure(one: Fault, other: Fault) -> bool:
+def _is_same_failure(first_fault: Fault, second_fault: Fault) -> bool:
     """Return whether two faults are equal. For the processor limit, the line is ignored because it varies."""
-    if one.verdict is Verdict.CPU_LIMIT:
-        one, other = (replace(each, line=None, file="") for each in (one, other))
-    return one == other
+    if first_fault.verdict is Verdict.CPU_LIMIT:
+        first_fault, second_fault = (replace(each, line=None, file="") for each in (first_fault, second_fault))
+    return first_fault == second_fault
 
 
 def _remove_seed(frame: wire.Frame) -> wire.Frame:
@@ -329,5 +329,5 @@ def _normalise_characters(text: str) -> str:
 
 def _find_imports(text: str) -> set[str]:
     """Return the imported module names, and any other words that follow ``import``."""
-    found = (source or names for source, names in _IMPORT.findall(text))
-    return {name.strip().partition(" ")[0].partition(".")[0] for names in found for name in names.split(",")}
+    import_lists = (source or names for source, names in _IMPORT.findall(text))
+    return {name.strip().partition(" ")[0].partition(".")[0] for names in import_lists for name in names.split(",")}

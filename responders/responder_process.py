@@ -117,21 +117,21 @@ class ResponderProcess:
         """Return whether the child is running."""
         return self._child is not None
 
-    def answer(self, text: str, t: int, message: int, collected: LoggedData, sender: int | None = None) -> Answer:
+    def answer(self, text: str, t: int, message: int, logged_data: LoggedData, sender: int | None = None) -> Answer:
         """Return the responder's answer to ``text``.
 
         Args:
             text: The text as it arrived.
             t: The time, in units of simulated time.
             message: The index of the message.
-            collected: The data that the robot has logged since the last text.
+            logged_data: The data that the robot has logged since the last text.
             sender: The number of the robot, in a trial of two.
         """
         if self._child is None:
             return Answer()
         self._message, self._asked_at, self._slept = message, t, 0
         try:
-            frame = {"do": "message", "t": t, "text": text, "data": collected.data, "images": collected.images}
+            frame = {"do": "message", "t": t, "text": text, "data": logged_data.data, "images": logged_data.images}
             self._child.send(frame if sender is None else {**frame, "sender": sender})
             return self._parse_answer(self._receive_until("answer"), t)
         except ChildStopped as stop:
@@ -147,40 +147,40 @@ class ResponderProcess:
 
     def _parse_answer(self, frame: wire.Frame, t: int) -> Answer:
         """Return the answer in a frame. A valid ``JSON::`` text also has an entry for the robot's queue."""
-        said = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
-        self._charge_output(said, "printed and answered")
+        text = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
+        self._charge_output(text, "printed and answered")
         hint = ""
         match frame["kind"]:
-            case "text" if not said.startswith(message_format.JSON):
-                return Answer(said, self._slept)
+            case "text" if not text.startswith(message_format.JSON):
+                return Answer(text, self._slept)
             case "text":
                 try:
-                    entry = message_format.format_queue_entry(said)
+                    entry = message_format.format_queue_entry(text)
                 except ValueError as error:
                     sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
                     return Answer(
-                        said, self._slept, self._build_protocol_fault(t, sentence, _JSON_HINT), note="malformed"
+                        text, self._slept, self._build_protocol_fault(t, sentence, _JSON_HINT), note="malformed"
                     )
                 self._meter.charge_bytes(len(entry))
-                return Answer(said, self._slept, entry=entry)
+                return Answer(text, self._slept, entry=entry)
             case "error":
                 return Answer(fault=build_error_fault(frame["error"], t + self._slept, "responder"))
             case "long":
-                what = f"an answer of {frame['length']} characters; the most is about 60000"
+                description = f"an answer of {frame['length']} characters; the most is about 60000"
             case _:
-                what = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
+                description = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
                 hint = _RETURN_HINT if frame["type"] == "NoneType" else _JSON_HINT
-        return Answer(fault=self._build_protocol_fault(t, describe_wrong_return(what), hint))
+        return Answer(fault=self._build_protocol_fault(t, describe_wrong_return(description), hint))
 
     def _build_protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
         agent = "" if self._who == "responder" else self._who
         return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, hint=hint, agent=agent)
 
-    def _receive_until(self, last: str) -> wire.Frame:
+    def _receive_until(self, final_kind: str) -> wire.Frame:
         assert self._child is not None
         while True:
             frame = self._child.receive(self._schema)
-            if frame["do"] == last:
+            if frame["do"] == final_kind:
                 return frame
             self._accept_frame(frame)
 
@@ -202,14 +202,14 @@ class ResponderProcess:
                 self._slept += frame["units"]
             case "call":
                 if len(self.calls) < _MOST_CALLS:
-                    words = {name: frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result")}
-                    before = len(self._agents.messages) if self._agents is not None else 0
-                    self.calls.append(Call(self._message, frame["depth"], before=before, **words))
+                    texts = {name: frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result")}
+                    message_count = len(self._agents.messages) if self._agents is not None else 0
+                    self.calls.append(Call(self._message, frame["depth"], before=message_count, **texts))
             case "ask" if self._agents is not None and self._child is not None:
-                told = self._agents.ask(self._who, frame, self._asked_at + self._slept, self._message)
-                self._slept += told.slept
+                reply = self._agents.ask(self._who, frame, self._asked_at + self._slept, self._message)
+                self._slept += reply.slept
                 now = self._asked_at + self._slept
-                self._child.send({"do": "told", "t": now, "kind": told.kind, "text": told.text})
+                self._child.send({"do": "told", "t": now, "kind": reply.kind, "text": reply.text})
             case kind:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the {self._who}'s process sent a stray {kind} frame")
 
@@ -221,10 +221,12 @@ class ResponderProcess:
         self._charge_output(text, "printed")
         self.output.append(text)
 
-    def _charge_output(self, text: str, did: str) -> None:
+    def _charge_output(self, text: str, deed: str) -> None:
         self._output_left -= len(text.encode("utf-8", "replace")) + 1
         if self._output_left < 0:
-            raise ChildStopped(Verdict.OUTPUT_LIMIT, f"the {self._who} {did} more than {self._spec.output_bytes} bytes")
+            raise ChildStopped(
+                Verdict.OUTPUT_LIMIT, f"the {self._who} {deed} more than {self._spec.output_bytes} bytes"
+            )
 
     def _convert_stop(self, stop: ChildStopped, t: int) -> Fault:
         self.close()

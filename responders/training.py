@@ -76,7 +76,7 @@ def train_and_predict(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter)
             for chunk in group
         ),
     ]
-    called = call_functions(
+    call_results = call_functions(
         replace(spec.code, text=f"{spec.code.text}\n\n\n{_load_harness()}"),
         {**spec.files, "train.npz": _pack_training_file(spec.images, spec.labels)},
         calls,
@@ -86,27 +86,27 @@ def train_and_predict(spec: TrainingSpec, sandboxes: Sandboxes, meter: JobMeter)
         spec.seed,
         meter,
     )
-    return tuple(_collect_predictions(called, groups, spec))
+    return tuple(_collect_predictions(call_results, groups, spec))
 
 
 def _collect_predictions(
-    called: CallResults, groups: Sequence[Sequence[Images]], spec: TrainingSpec
+    call_results: CallResults, groups: Sequence[Sequence[Images]], spec: TrainingSpec
 ) -> Iterator[Predictions]:
     """Yield the predictions of each group, validated because they are untrusted."""
-    fault = called.fault or (called.returned[0].fault if called.returned else None)
-    trained, end = fault is None, 1
+    fault = call_results.fault or (call_results.returned[0].fault if call_results.returned else None)
+    is_trained, end = fault is None, 1
     for group in groups:
         names: list[str | None] = []
-        for chunk, returned in zip(group, called.returned[end:], strict=False):
-            given = _parse_labels(returned, len(chunk)) if trained else None
-            if given is None and fault is None:
-                fault = returned.fault or _build_answer_fault()
-            names += given or [None] * len(chunk)
+        for chunk, call_result in zip(group, call_results.returned[end:], strict=False):
+            chunk_labels = _parse_labels(call_result, len(chunk)) if is_trained else None
+            if chunk_labels is None and fault is None:
+                fault = call_result.fault or _build_answer_fault()
+            names += chunk_labels or [None] * len(chunk)
         end += len(group)
-        missing = sum(map(len, group)) - len(names)
-        output = "\n".join(itertools.chain.from_iterable(called.printed[: end + 1]))
-        notes = called.notes[: end + 1][-1]
-        yield Predictions((*names, *[None] * missing), _drop_harness_line(fault, spec), output, notes)
+        missing_count = sum(map(len, group)) - len(names)
+        output = "\n".join(itertools.chain.from_iterable(call_results.printed[: end + 1]))
+        notes = call_results.notes[: end + 1][-1]
+        yield Predictions((*names, *[None] * missing_count), _drop_harness_line(fault, spec), output, notes)
 
 
 def _parse_labels(returned: CallResult, count: int) -> list[str | None] | None:

@@ -32,10 +32,10 @@ def robomark_predict(pixels: "str", side: "int") -> "list[str]":
 
     flat = numpy.frombuffer(base64.b64decode(pixels), dtype=numpy.uint8)
     rows = robomark_rows(flat.reshape(-1, side, side))
-    named = [str(name)[:100] for name in robomark_models[-1].predict(rows)]
-    if len(named) != len(rows):
-        raise ValueError(f"predict gave {len(named)} answers for {len(rows)} images")
-    return named
+    labels = [str(name)[:100] for name in robomark_models[-1].predict(rows)]
+    if len(labels) != len(rows):
+        raise ValueError(f"predict gave {len(labels)} answers for {len(rows)} images")
+    return labels
 
 
 def robomark_rows(images: "typing.Any") -> "typing.Any":

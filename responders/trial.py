@@ -44,7 +44,7 @@ def run_trial(
         try:
             program = sandboxes.spawn(spec.program.role, spec.program.limits, meter=meter)
             try:
-                unloadable = responder.load() if responder is not None else None
+                loading_fault = responder.load() if responder is not None else None
                 bridge = Bridge(spec, arena, camera, program, responder, meter)
                 fault = bridge.run()
             finally:
@@ -52,13 +52,17 @@ def run_trial(
         finally:
             if responder is not None:
                 responder.close()
-        log, unread = read_log(folder, meter) if responder is not None else ("", None)
+        log, log_fault = read_log(folder, meter) if responder is not None else ("", None)
         if agents is not None:
             agents.seal(bridge.chain, bridge.now)
             agents.finish()
     bridge.conversation.finish()
-    of_agents = agents.faults if agents is not None else ()
-    faults = [each for each in (*of_agents, unloadable, *bridge.conversation.faults, fault, unread) if each is not None]
+    agent_faults = agents.faults if agents is not None else ()
+    faults = [
+        each
+        for each in (*agent_faults, loading_fault, *bridge.conversation.faults, fault, log_fault)
+        if each is not None
+    ]
     faults.sort(key=lambda each: each.t)
     recording = build_recording(spec, bridge, tuple(faults), program.sandbox)
     if responder is None:

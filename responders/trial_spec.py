@@ -46,7 +46,7 @@ class ExecutedStatements:
 class ProgramSpec:
     """A robot program and its resources. ``modules`` maps the names of importable modules to their source.
 
-    ``ran`` collects the executed statements, if given.
+    ``executed_statements`` collects the executed statements, if given.
     """
 
     code: SourceFile
@@ -66,7 +66,7 @@ class ProgramSpec:
 
 @dataclass(frozen=True, slots=True)
 class ResponderSpec:
-    """A responder: its code and the files in its folder. ``ran`` as in ``ProgramSpec``."""
+    """A responder: its code and the files in its folder. ``executed_statements`` as in ``ProgramSpec``."""
 
     code: SourceFile
     files: Mapping[str, bytes]
@@ -78,9 +78,11 @@ class ResponderSpec:
     @property
     def role(self) -> ChildRole:
         """Return the role of the process. It has libraries loaded unless the responder certainly needs none."""
-        withheld = any(name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.excluded_modules)
-        needed = withheld or may_need_libraries(self.code.text, self.files)
-        return "responder with libraries" if needed else "responder"
+        has_missing_packages = any(
+            name.partition(".")[0] not in sys.stdlib_module_names for name in self.limits.excluded_modules
+        )
+        needs_libraries = has_missing_packages or may_need_libraries(self.code.text, self.files)
+        return "responder with libraries" if needs_libraries else "responder"
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,8 @@ def _is_text(value: object) -> bool:
     return isinstance(value, str)
 
 
-def _allow_range(low: int, high: int) -> Check:
-    return lambda value: type(value) is int and low <= value <= high
+def _allow_range(minimum: int, maximum: int) -> Check:
+    return lambda value: type(value) is int and minimum <= value <= maximum
 
 
 def _is_flag(value: object) -> bool:
@@ -291,15 +291,15 @@ def parse_frame(line: bytes, schema: Schema) -> Frame:
     fields = schema.get(frame["do"])
     if fields is None:
         raise WireError("a frame of an unknown kind")
-    required, optional = fields
-    for name, check in required.items():
+    required_fields, optional_fields = fields
+    for name, check in required_fields.items():
         if name not in frame or not check(frame[name]):
             raise WireError(f"a {frame['do']} frame with a wrong {name}")
-    if len(frame) > len(required) + 1:
+    if len(frame) > len(required_fields) + 1:
         for name, value in frame.items():
-            if name == "do" or name in required:
+            if name == "do" or name in required_fields:
                 continue
-            if name not in optional or not optional[name](value):
+            if name not in optional_fields or not optional_fields[name](value):
                 raise WireError(f"a {frame['do']} frame with a wrong {name[:40]!r}")
     if frame["do"] == "answer" and _ANSWER_FIELDS[frame["kind"]] not in frame:
         raise WireError(f"an answer without its {_ANSWER_FIELDS[frame['kind']]}")
@@ -320,13 +320,13 @@ def _replace_surrogates(value: Any) -> Any:
 _encode = json.JSONEncoder(separators=(",", ":")).encode
 
 
-def encode_frame(frame: Mapping[str, Any], number: int, arrived: Sequence[str] = ()) -> bytes:
+def encode_frame(frame: Mapping[str, Any], number: int, entries: Sequence[str] = ()) -> bytes:
     """Return a frame for a child as one line with its number.
 
-    ``arrived`` holds JSON texts, which are inserted into the list ``m`` unchanged.
+    ``entries`` holds JSON texts, which are inserted into the list ``m`` unchanged.
     """
     line = _encode({"n": number, **frame}).encode("ascii")
-    if arrived:
+    if entries:
         # Keeps lone surrogates: the child's JSON parser accepts them.
-        line = line[:-1] + f',"m":[{",".join(arrived)}]}}'.encode("utf-8", "surrogatepass")
+        line = line[:-1] + f',"m":[{",".join(entries)}]}}'.encode("utf-8", "surrogatepass")
     return line + b"\n"

@@ -40,7 +40,7 @@ def load_submission(path: str | os.PathLike[str], assignment: Assignment, *, stu
     Raises:
         UsageError: If it can't be read, or lacks a part that the assignment requires.
     """
-    return read_submission(Path(path), student=student, asked=assignment.parts)
+    return read_submission(Path(path), student=student, required_parts=assignment.parts)
 
 
 class Grader(AbstractContextManager["Grader"]):
@@ -70,7 +70,7 @@ class Grader(AbstractContextManager["Grader"]):
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None, /
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None, /
     ) -> None:
         self.close()
 
@@ -82,5 +82,5 @@ def grade(submission: Submission, assignment: Assignment) -> Grade:
         UsageError: If the submission has no part that the assignment requires.
         HostError: If this machine can't run student code safely, or fails.
     """
-    with Grader() as own:
-        return own.grade(submission, assignment)
+    with Grader() as grader:
+        return grader.grade(submission, assignment)

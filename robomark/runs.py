@@ -45,10 +45,10 @@ def run_program(
         HostError: If this machine can't run student code safely, or fails.
     """
     options = RunOptions(flags=parse_flags("sim_magic", flags), seconds=seconds, seed=seed)
-    answering = None if responder is None else standalone_runs.load_responder(responder, options.limits)
+    loaded_responder = None if responder is None else standalone_runs.load_responder(responder, options.limits)
     with TrialRunner() as runner:
         program = standalone_runs.read_program(Path(path))
-        return standalone_runs.run_program(program, options, runner, responder=answering).recording
+        return standalone_runs.run_program(program, options, runner, responder=loaded_responder).recording
 
 
 def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -74,11 +74,11 @@ def _unpack_page(page: bytes) -> bytes:
     Raises:
         ValueError: If the page has no data, or too much. Invalid data may also raise KeyError, TypeError or zlib.error.
     """
-    found = _DATA_SCRIPT.search(page)
-    if found is None:
+    match = _DATA_SCRIPT.search(page)
+    if match is None:
         raise ValueError("the page has no data")
     unpack = zlib.decompressobj()
-    data = unpack.decompress(base64.b64decode(read_json(found[1])["deflated"]), _MOST_BYTES)
+    data = unpack.decompress(base64.b64decode(read_json(match[1])["deflated"]), _MOST_BYTES)
     if unpack.unconsumed_tail:
         raise ValueError(f"the page has more than {_MOST_BYTES >> 20} MB of data")
     return data

@@ -27,8 +27,8 @@ def build_rows(
     rows = [build_rejected_row(refusal) for refusal in refusals]
     for line in lines:
         grade = grades.get(line.id)
-        named = None if grade is None else replace(grade, student=line.student)
-        rows.append(build_row(line, named, reasons[line.id]))
+        line_grade = None if grade is None else replace(grade, student=line.student)
+        rows.append(build_row(line, line_grade, reasons[line.id]))
     return sorted(rows, key=lambda row: (row.who, row.assignment))
 
 
@@ -36,8 +36,10 @@ def build_row(line: JobLine, grade: Grade | None, reason: str = "") -> TableRow[
     """Return the row of one job."""
     student = Student(line.student, line.name, line.email)
     reason = reason or describe_missing_part(line.missing)
-    told, for_staff = _describe_for_students(line), line.staff_only is not None
-    return TableRow(student, line.source, line.assignment, grade, reason, student_reason=told, for_staff=for_staff)
+    student_reason, for_staff = _describe_for_students(line), line.staff_only is not None
+    return TableRow(
+        student, line.source, line.assignment, grade, reason, student_reason=student_reason, for_staff=for_staff
+    )
 
 
 def build_rejected_row(refusal: RejectedSubmission) -> TableRow[Grade]:

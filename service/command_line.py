@@ -42,18 +42,18 @@ class _LazyValidation:
         command: Any = super()
         for parameter in command.get_params(ctx):
             parameter.process_value = _skip_needless_validation(parameter)
-        left: list[str] = command.parse_args(ctx, args)
-        return left
+        remaining: list[str] = command.parse_args(ctx, args)
+        return remaining
 
 
 def _skip_needless_validation(parameter: Any) -> Callable[[Any, Any], Any]:
     """Return a value processor that skips validation for values of the right type, and for missing optional ones."""
-    checked = parameter.process_value
-    may_be_missing = not (parameter.required or parameter.multiple or parameter.nargs == -1)
+    process_value = parameter.process_value
+    is_optional = not (parameter.required or parameter.multiple or parameter.nargs == -1)
 
     def taken(ctx: Any, value: Any) -> Any:
-        if type(value) is not parameter.type_descriptor.annotation and not (value is None and may_be_missing):
-            return checked(ctx, value)
+        if type(value) is not parameter.type_descriptor.annotation and not (value is None and is_optional):
+            return process_value(ctx, value)
         return value if parameter.callback is None else parameter.callback(ctx, parameter, value)
 
     return taken
@@ -68,32 +68,32 @@ class _CommandGroup(_LazyValidation, TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
         """Return the name, the command, and the remaining arguments."""
-        name, listed, rest = super().resolve_command(ctx, args)
-        if name is None or isinstance(listed, _CommandGroup):
-            return name, listed, rest
+        name, placeholder, remaining = super().resolve_command(ctx, args)
+        if name is None or isinstance(placeholder, _CommandGroup):
+            return name, placeholder, remaining
         command = load_command(*ctx.command_path.split()[1:], name)
         # Imported objects are permanent, so the collector skips them.
         gc.freeze()
         gc.enable()
-        return name, command, rest
+        return name, command, remaining
 
 
 def load_command(*path: str) -> Any:
     """Import a command by its path and return it as Typer runs it."""
     *groups, name = path
-    listed: Any = COMMANDS
+    entry: Any = COMMANDS
     for group in groups:
-        listed = listed[group].commands
-    command: Command = listed[name]
+        entry = entry[group].commands
+    command: Command = entry[name]
     keep_files_private()
     module, _, attribute = command.entry_point.partition(":")
-    found = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
+    function = getattr(importlib.import_module(f"service.commands.{module}"), attribute)
     app = typer.Typer(context_settings=_CONTEXT, rich_markup_mode=None, add_completion=False)
-    app.command(name, cls=_Command)(found)
-    loaded = get_command(app)
+    app.command(name, cls=_Command)(function)
+    result = get_command(app)
     if not command.serves:
-        loaded.params += _build_shared_options()
-    return loaded
+        result.params += _build_shared_options()
+    return result
 
 
 def _build_shared_options() -> list[Any]:
@@ -141,18 +141,18 @@ def _build_group_arguments() -> dict[str, Any]:
 
 
 def _add_commands(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> None:
-    for name, listed in commands.items():
-        if isinstance(listed, Command):
-            app.command(name, short_help=listed.summary)(_do_nothing)
+    for name, entry in commands.items():
+        if isinstance(entry, Command):
+            app.command(name, short_help=entry.summary)(_do_nothing)
         else:
-            group = typer.Typer(help=listed.summary, **_build_group_arguments())
+            group = typer.Typer(help=entry.summary, **_build_group_arguments())
             group.callback()(_do_nothing)
-            _add_commands(group, listed.commands)
-            app.add_typer(group, name=name, short_help=listed.summary)
+            _add_commands(group, entry.commands)
+            app.add_typer(group, name=name, short_help=entry.summary)
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(is_requested: bool) -> None:
+    if is_requested:
         # Imported here, because it takes longer than the rest of --help.
         from service.version import GRADER_VERSION
 
@@ -180,7 +180,7 @@ def main() -> NoReturn:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Typer returns the status of its own exits: help, and a stop by Ctrl-C.
-        ending = _build_command_line()(prog_name="robomark", standalone_mode=False)
+        exit_code = _build_command_line()(prog_name="robomark", standalone_mode=False)
         sys.stdout.flush()
     except UsageError as error:
         _exit_with_error(str(error), _CALLER)
@@ -194,15 +194,15 @@ def main() -> NoReturn:
         _exit_with_error("stopped", _STOPPED)
     except BrokenPipeError:
         _exit_silently()
-    except SystemExit as ended:
+    except SystemExit as system_exit:
         # Typer itself exits this way after shell completion, or if the output is closed.
-        if not ended.code:
+        if not system_exit.code:
             raise
         _exit_silently()
     except OSError as error:
         _print_debug_traceback()
-        where = "" if error.filename is None else f"{error.filename}: "
-        _exit_with_error(f"the operating system reported an error: {where}{error.strerror or error}", _OURS)
+        file_prefix = "" if error.filename is None else f"{error.filename}: "
+        _exit_with_error(f"the operating system reported an error: {file_prefix}{error.strerror or error}", _OURS)
     except Exception as error:
         _print_debug_traceback()
         database = sys.modules.get("sqlalchemy.exc")
@@ -213,9 +213,9 @@ def main() -> NoReturn:
             "(set ROBOMARK_DEBUG=1 to see where)",
             _OURS,
         )
-    if ending == _STOPPED:
+    if exit_code == _STOPPED:
         _exit_with_error("stopped", _STOPPED)
-    sys.exit(ending if isinstance(ending, int) else 0)
+    sys.exit(exit_code if isinstance(exit_code, int) else 0)
 
 
 def _prepare_streams() -> None:

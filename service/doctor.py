@@ -127,22 +127,27 @@ def _check_service_release(settings: Settings, _store: Store) -> tuple[bool, str
 
 
 def _check_python(_settings: Settings) -> tuple[bool, str]:
-    fits = sys.version_info[:2] == (3, 11) and platform.machine() == "x86_64" and sys.platform == "linux"
-    found = f"{platform.python_implementation()} {platform.python_version()} on {sys.platform} {platform.machine()}"
-    return fits, found if fits else f"{found}; PyBullet needs CPython 3.11 on x86-64 Linux"
+    is_supported = sys.version_info[:2] == (3, 11) and platform.machine() == "x86_64" and sys.platform == "linux"
+    description = (
+        f"{platform.python_implementation()} {platform.python_version()} on {sys.platform} {platform.machine()}"
+    )
+    return is_supported, description if is_supported else f"{description}; PyBullet needs CPython 3.11 on x86-64 Linux"
 
 
 def _check_installed_files(_settings: Settings) -> tuple[bool, str]:
     """Check that the installed files are unchanged: another distribution may contain a ``models/`` folder, too."""
-    recorded = [file for file in metadata.files("robomark") or () if file.hash is not None]
-    ours = [file for file in recorded if file.parts[0] in _PACKAGES]
-    if not ours:
+    recorded_files = [file for file in metadata.files("robomark") or () if file.hash is not None]
+    own_files = [file for file in recorded_files if file.parts[0] in _PACKAGES]
+    if not own_files:
         return True, "an editable installation, so its files cannot be compared with a record"
-    changed = sorted(str(file) for file in ours if not _is_unchanged(file))
-    if not changed:
-        return True, f"{len(ours)} files are unchanged since installation"
-    more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
-    return False, f"{changed[0]}{more} changed since installation, perhaps by another package: install robomark again"
+    changes = sorted(str(file) for file in own_files if not _is_unchanged(file))
+    if not changes:
+        return True, f"{len(own_files)} files are unchanged since installation"
+    other_changes = f" and {len(changes) - 1} more" if len(changes) > 1 else ""
+    return (
+        False,
+        f"{changes[0]}{other_changes} changed since installation, perhaps by another package: install robomark again",
+    )
 
 
 def _is_unchanged(file: metadata.PackagePath) -> bool:
@@ -171,24 +176,24 @@ def _check_sandbox(_settings: Settings) -> tuple[bool, str]:
 
 
 def _check_worker_sandboxes(_settings: Settings, store: Store) -> tuple[bool, str]:
-    standing = sorted({worker.sandbox for worker in _load_recent_workers(store)})
-    return bool(standing), "; ".join(standing) or "no worker has reported its sandbox layers"
+    layers = sorted({worker.sandbox for worker in _load_recent_workers(store)})
+    return bool(layers), "; ".join(layers) or "no worker has reported its sandbox layers"
 
 
 def _check_control_groups(settings: Settings) -> tuple[bool, str]:
     """Check control groups, which are optional. A worker's unit may have them although this process does not."""
     reason = control_group.check_available()
-    told = (
+    description = (
         f"a worker started from here has {'one for each concurrent grading' if reason is None else f'none: {reason}'}"
     )
     with _open_usable_store(settings) as store:
         if store is None:
-            return True, told
-        lately = _load_recent_workers(store)
-    if not lately:
-        return True, told
-    have = sum("control group" in worker.sandbox for worker in lately)
-    return True, f"{told}; {have} of {len(lately)} workers seen recently have control groups"
+            return True, description
+        recent_workers = _load_recent_workers(store)
+    if not recent_workers:
+        return True, description
+    group_count = sum("control group" in worker.sandbox for worker in recent_workers)
+    return True, f"{description}; {group_count} of {len(recent_workers)} workers seen recently have control groups"
 
 
 def _check_trial_isolation(_settings: Settings) -> tuple[bool, str]:
@@ -207,8 +212,8 @@ def _check_home(settings: Settings) -> tuple[bool, str]:
     if not os.access(settings.home, os.W_OK | os.X_OK):
         return False, f"{settings.home} cannot be written"
     free = shutil.disk_usage(settings.home).free
-    enough = free >= _FREE_BYTES
-    return enough, f"{settings.home}, {free / 1e9:.1f} GB free" + ("" if enough else "; at least 1 GB is needed")
+    has_space = free >= _FREE_BYTES
+    return has_space, f"{settings.home}, {free / 1e9:.1f} GB free" + ("" if has_space else "; at least 1 GB is needed")
 
 
 def _check_database(settings: Settings) -> tuple[bool, str]:
@@ -217,12 +222,12 @@ def _check_database(settings: Settings) -> tuple[bool, str]:
         state = load_schema_state(engine)
     finally:
         engine.dispose()
-    where = engine.url.render_as_string(hide_password=True)
+    address = engine.url.render_as_string(hide_password=True)
     if state.revision is None:
-        return True, f"{where}, no tables yet; they are created on first use"
+        return True, f"{address}, no tables yet; they are created on first use"
     if state.problem:
-        return False, f"{where} is {state.problem}"
-    return True, f"{where}, tables at revision {state.revision}"
+        return False, f"{address} is {state.problem}"
+    return True, f"{address}, tables at revision {state.revision}"
 
 
 def _check_tables(_settings: Settings, store: Store) -> tuple[bool, str]:
@@ -234,43 +239,43 @@ def _check_tables(_settings: Settings, store: Store) -> tuple[bool, str]:
 
 def _check_secret(settings: Settings) -> tuple[bool, str]:
     """Check that trials here have the same worlds as the newest grade."""
-    whose = "the secret in the database" if settings.own_secret is None else "the secret in ROBOMARK_SECRET"
+    origin = "the secret in the database" if settings.own_secret is None else "the secret in ROBOMARK_SECRET"
     with _open_usable_store(settings) as store:
         if store is None:
-            return True, f"{whose}; it is created with the tables" if settings.own_secret is None else whose
+            return True, f"{origin}; it is created with the tables" if settings.own_secret is None else origin
         secret = load_secret(store)
         with store.reading() as session:
-            newest = session.scalar(
+            sha256 = session.scalar(
                 select(Job.secret_sha256)
                 .where(Job.state == JobState.DONE, Job.copied_from.is_(None), Job.secret_sha256.is_not(None))
                 .order_by(Job.finished_at.desc())
                 .limit(1)
             )
-    told = f"{whose}, hash {secret.name}"
-    if newest not in (None, secret.sha256):
+    state = f"{origin}, hash {secret.name}"
+    if sha256 not in (None, secret.sha256):
         return (
             False,
-            f"{told}; the newest grade has {format_secret_name(newest)}: every machine needs the same ROBOMARK_SECRET",
+            f"{state}; the newest grade has {format_secret_name(sha256)}: every machine needs the same ROBOMARK_SECRET",
         )
-    return True, told
+    return True, state
 
 
 def _check_broker(settings: Settings) -> tuple[bool, str]:
     if not settings.broker_url:
-        running = "runs" if is_broker_responding(settings) else "is started when needed"
-        return True, f"the bundled Valkey, which {running}, on {prepare_socket_path(settings)}"
+        state = "runs" if is_broker_responding(settings) else "is started when needed"
+        return True, f"the bundled Valkey, which {state}, on {prepare_socket_path(settings)}"
     client = create_broker_client(settings.broker_url, 3.0)
     try:
         version = str(client.info("server").get("redis_version", "0"))
         policy = str(client.info("memory").get("maxmemory_policy", ""))
     finally:
         client.close()
-    where = client.connection_pool.connection_kwargs.get("host", settings.broker_url)
+    host = client.connection_pool.connection_kwargs.get("host", settings.broker_url)
     if tuple(int(part) for part in version.split(".")[:2] if part.isdigit()) < _OLDEST_BROKER:
-        return False, f"{where} is running, version {version}; {'.'.join(map(str, _OLDEST_BROKER))} or later is needed"
+        return False, f"{host} is running, version {version}; {'.'.join(map(str, _OLDEST_BROKER))} or later is needed"
     if policy not in ("", "noeviction"):
-        return False, f"{where} deletes keys when its memory is full: set maxmemory-policy to noeviction"
-    return True, f"{where} is running, version {version}"
+        return False, f"{host} deletes keys when its memory is full: set maxmemory-policy to noeviction"
+    return True, f"{host} is running, version {version}"
 
 
 def _check_service_broker(settings: Settings, _store: Store) -> tuple[bool, str]:
@@ -285,20 +290,22 @@ def _check_known_answer(settings: Settings) -> tuple[bool, str]:
 
     with TrialRunner() as runner:
         actual = known_answers.run_self_test(runner)
-    wrong = "" if actual is None else known_answers.describe_difference(known_answers.load_known_answer(), actual)
-    if wrong:
-        return False, f"this machine gives wrong grades: {wrong}"
-    here = "stopped by a limit of this machine" if actual is None else "correct on this machine"
+    difference = "" if actual is None else known_answers.describe_difference(known_answers.load_known_answer(), actual)
+    if difference:
+        return False, f"this machine gives wrong grades: {difference}"
+    local_result = "stopped by a limit of this machine" if actual is None else "correct on this machine"
     with _open_usable_store(settings) as store:
         if store is None:
-            return True, here
+            return True, local_result
         with store.reading() as session:
-            lately = now(session) - timedelta(days=1)
-            shut_out = [found for found in workers.list_quarantined_workers(session) if found.since > lately]
-    if not shut_out:
-        return True, here
-    told = "; ".join(f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in shut_out)
-    return False, f"{here}; in quarantine: {told}"
+            yesterday = now(session) - timedelta(days=1)
+            quarantined = [found for found in workers.list_quarantined_workers(session) if found.since > yesterday]
+    if not quarantined:
+        return True, local_result
+    quarantine_list = "; ".join(
+        f"{found.worker} since {found.since:%Y-%m-%d %H:%M} UTC: {found.reason}" for found in quarantined
+    )
+    return False, f"{local_result}; in quarantine: {quarantine_list}"
 
 
 def _check_clock(settings: Settings) -> tuple[bool, str]:
@@ -309,39 +316,43 @@ def _check_clock(settings: Settings) -> tuple[bool, str]:
         if store.engine.dialect.name == "sqlite":
             return True, "this machine's, because the database is a local file"
         with store.reading() as session:
-            apart = abs((now(session) - datetime.now(UTC)).total_seconds())
-    if apart > _CLOCK_DIFFERENCE_SECONDS:
-        return False, f"{apart:.0f} s different from the database's clock: times in this machine's logs are wrong"
+            difference = abs((now(session) - datetime.now(UTC)).total_seconds())
+    if difference > _CLOCK_DIFFERENCE_SECONDS:
+        return False, f"{difference:.0f} s different from the database's clock: times in this machine's logs are wrong"
     return True, "same as the database's clock"
 
 
 def _check_workers(settings: Settings) -> tuple[bool, str]:
-    here = (
+    local_state = (
         "running on this machine"
         if is_worker_running(settings)
         else "not running on this machine; start it with robomark up"
     )
     with _open_usable_store(settings) as store:
         if store is None:
-            return True, here
-        lately = _load_recent_workers(store)
-    if not lately:
-        return True, here
-    slots = sum(worker.concurrency for worker in lately)
-    hosts = len({worker.host for worker in lately})
-    told = f"{here}; seen recently: {len(lately)} on {hosts} machines, concurrency {slots}"
-    problems = [f"{worker.name}: {worker.problem}" for worker in lately if worker.problem]
-    return not problems, "; ".join([told, *problems])
+            return True, local_state
+        recent_workers = _load_recent_workers(store)
+    if not recent_workers:
+        return True, local_state
+    slots = sum(worker.concurrency for worker in recent_workers)
+    hosts = len({worker.host for worker in recent_workers})
+    description = f"{local_state}; seen recently: {len(recent_workers)} on {hosts} machines, concurrency {slots}"
+    problems = [f"{worker.name}: {worker.problem}" for worker in recent_workers if worker.problem]
+    return not problems, "; ".join([description, *problems])
 
 
 def _check_service_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
-    lately = _load_recent_workers(store)
-    if not lately:
+    recent_workers = _load_recent_workers(store)
+    if not recent_workers:
         return False, "no worker was seen recently"
-    fit = [worker for worker in lately if not worker.problem]
-    told = f"{len(fit)} seen recently, concurrency {sum(worker.concurrency for worker in fit)}"
-    problems = Counter(worker.problem for worker in lately if worker.problem)
-    return bool(fit), "; ".join([told, *(f"{count} not ready: {problem}" for problem, count in problems.items())])
+    ready_workers = [worker for worker in recent_workers if not worker.problem]
+    description = (
+        f"{len(ready_workers)} seen recently, concurrency {sum(worker.concurrency for worker in ready_workers)}"
+    )
+    problems = Counter(worker.problem for worker in recent_workers if worker.problem)
+    return bool(ready_workers), "; ".join(
+        [description, *(f"{count} not ready: {problem}" for problem, count in problems.items())]
+    )
 
 
 def _check_queue(settings: Settings) -> tuple[bool, str]:
@@ -352,18 +363,20 @@ def _check_queue(settings: Settings) -> tuple[bool, str]:
 def _check_service_queue(_settings: Settings, store: Store) -> tuple[bool, str]:
     with store.reading() as session:
         metrics = collect_queue_metrics(session)
-    waiting = sum(metrics.claimable.values())
-    oldest = max(metrics.oldest_seconds.values(), default=0.0)
-    dead = metrics.count(JobState.DEAD)
-    told = f"{waiting} queued" + (f", the oldest for {timedelta(seconds=round(oldest))}" if waiting else "")
-    told += f"; {dead} failed: see robomark batch list and robomark batch retry" if dead else ""
-    if waiting and oldest > _LONG_WAIT_SECONDS and not any(seen.lately for seen in metrics.workers):
-        return False, f"{told}; no worker was seen recently"
+    queued_count = sum(metrics.claimable.values())
+    oldest_seconds = max(metrics.oldest_seconds.values(), default=0.0)
+    dead_count = metrics.count(JobState.DEAD)
+    description = f"{queued_count} queued" + (
+        f", the oldest for {timedelta(seconds=round(oldest_seconds))}" if queued_count else ""
+    )
+    description += f"; {dead_count} failed: see robomark batch list and robomark batch retry" if dead_count else ""
+    if queued_count and oldest_seconds > _LONG_WAIT_SECONDS and not any(seen.lately for seen in metrics.workers):
+        return False, f"{description}; no worker was seen recently"
     # In a long backlog, no job may be running for a moment between two jobs.
-    idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
-    if waiting and oldest > _STUCK_SECONDS and idle:
-        return False, f"{told}; workers are running but start no jobs: check their logs or restart them"
-    return True, told
+    is_idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
+    if queued_count and oldest_seconds > _STUCK_SECONDS and is_idle:
+        return False, f"{description}; workers are running but start no jobs: check their logs or restart them"
+    return True, description
 
 
 def _load_recent_workers(store: Store) -> list[workers.WorkerDescription]:

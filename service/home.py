@@ -64,11 +64,11 @@ def user_permissions() -> Iterator[None]:
     if users is None:
         yield
         return
-    private = os.umask(users)
+    private_umask = os.umask(users)
     try:
         yield
     finally:
-        os.umask(private)
+        os.umask(private_umask)
 
 
 _LOADERS: tuple[tuple[type[Any], list[str]], ...] = (
@@ -116,19 +116,19 @@ def _check_parents(home: Path) -> None:
     for folder in dict.fromkeys((*home.parents, *home.resolve().parents)):
         if not folder.exists():
             continue
-        found = folder.stat()
-        _check_owner(home, folder, found, _ROOT_USER_IDS)
-        if found.st_mode & stat.S_IWOTH and not found.st_mode & stat.S_ISVTX:
+        status = folder.stat()
+        _check_owner(home, folder, status, _ROOT_USER_IDS)
+        if status.st_mode & stat.S_IWOTH and not status.st_mode & stat.S_ISVTX:
             raise UsageError(
                 f"the home {home} is open to other users: all users can write in {folder}; expected another folder in "
                 f"ROBOMARK_HOME, or chmod o-w {folder}"
             )
 
 
-def _check_owner(home: Path, path: Path, found: os.stat_result, also: tuple[int, ...] = ()) -> None:
-    if found.st_uid not in (os.geteuid(), *also):
+def _check_owner(home: Path, path: Path, status: os.stat_result, other_owners: tuple[int, ...] = ()) -> None:
+    if status.st_uid not in (os.geteuid(), *other_owners):
         raise UsageError(
-            f"the home {home} has another owner: {path} belongs to {_describe_user(found.st_uid)}, and Robomark runs "
+            f"the home {home} has another owner: {path} belongs to {_describe_user(status.st_uid)}, and Robomark runs "
             f"as {_describe_user(os.geteuid())}; run it as that user, or set another folder in ROBOMARK_HOME"
         )
 
@@ -156,12 +156,12 @@ def _make_home_private(home: Path) -> int:
 def _make_path_private(home: Path, path: Path) -> bool:
     """Make a path private and return whether it was open. Rejects files of other users, which would be trusted."""
     try:
-        found = path.lstat()
-        _check_owner(home, path, found)
-        was_open = not stat.S_ISLNK(found.st_mode) and bool(found.st_mode & _PRIVATE_UMASK)
-        if was_open:
-            path.chmod(stat.S_IMODE(found.st_mode) & ~_PRIVATE_UMASK)
+        status = path.lstat()
+        _check_owner(home, path, status)
+        is_open = not stat.S_ISLNK(status.st_mode) and bool(status.st_mode & _PRIVATE_UMASK)
+        if is_open:
+            path.chmod(stat.S_IMODE(status.st_mode) & ~_PRIVATE_UMASK)
     except FileNotFoundError:
         # Services create and delete files concurrently.
         return False
-    return was_open
+    return is_open

@@ -33,15 +33,15 @@ class Language:
             return sentence
         if not sentence.values:
             return self.catalogue.gettext(sentence.template) if sentence.template else ""
-        told = {
+        translated_parts = {
             name: self.translate_sentence(part) if isinstance(part, Sentence) else part
             for name, part in sentence.values.items()
         }
-        return self.say(sentence.template, **told)
+        return self.say(sentence.template, **translated_parts)
 
-    def counted(self, one: str, many: str, count: int, /, **parts: object) -> str:
+    def counted(self, singular: str, plural: str, count: int, /, **parts: object) -> str:
         """Translate a sentence in the singular or plural; ``count`` is available as a part."""
-        return self.catalogue.ngettext(one, many, count) % {"count": count, **parts}
+        return self.catalogue.ngettext(singular, plural, count) % {"count": count, **parts}
 
     def format_integer(self, number: int) -> str:
         """Format an integer with thousands separators; outside English, with spaces instead of commas."""
@@ -86,7 +86,7 @@ def load_language(code: str) -> Language:
     from babel.messages.pofile import read_po
 
     source = files("service").joinpath("locale", f"{code}.po").read_bytes()
-    compiled = io.BytesIO()
-    write_mo(compiled, read_po(io.BytesIO(source)))
-    compiled.seek(0)
-    return Language(code, gettext.GNUTranslations(compiled))
+    compiled_catalogue = io.BytesIO()
+    write_mo(compiled_catalogue, read_po(io.BytesIO(source)))
+    compiled_catalogue.seek(0)
+    return Language(code, gettext.GNUTranslations(compiled_catalogue))

@@ -69,12 +69,12 @@ def extract_messages() -> Catalog:
     """Extract all messages of pages and reports, with their locations."""
     catalogue = Catalog(project="Robomark", charset="utf-8")
     service, submissions = (Path(str(files(package))) for package in ("service", "submissions"))
-    told = [
+    entries = [
         *extract_from_dir(service, _TRANSLATED_SOURCES, _OPTIONS, keywords=_KEYWORDS),
         *extract_from_dir(service, _ERROR_SOURCES, keywords=_ERROR_KEYWORDS),
         *extract_from_dir(submissions, _SUBMISSION_ERROR_SOURCES, keywords=_ERROR_KEYWORDS),
     ]
-    for name, line, message, comments, context in told:
+    for name, line, message, comments, context in entries:
         catalogue.add(message, None, [(name, line)], auto_comments=comments, context=context)
     return catalogue
 
@@ -87,19 +87,19 @@ def locate_catalogue(code: str) -> Path:
 def update_catalogue(code: str) -> Catalog:
     """Return a language's catalogue with all current messages and without obsolete ones."""
     with locate_catalogue(code).open("rb") as file:
-        kept = read_po(file, locale=code)
-    kept.update(extract_messages(), no_fuzzy_matching=True)
-    kept.obsolete.clear()
-    return kept
+        catalogue = read_po(file, locale=code)
+    catalogue.update(extract_messages(), no_fuzzy_matching=True)
+    catalogue.obsolete.clear()
+    return catalogue
 
 
 def main() -> None:
     """Update every catalogue."""
     for code in list_languages():
         if code != SOURCE_LANGUAGE:
-            updated = update_catalogue(code)
+            catalogue = update_catalogue(code)
             with locate_catalogue(code).open("wb") as file:
-                write_po(file, updated, width=100, omit_header=False, no_location=True, sort_output=True)
+                write_po(file, catalogue, width=100, omit_header=False, no_location=True, sort_output=True)
 
 
 if __name__ == "__main__":

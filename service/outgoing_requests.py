@@ -68,20 +68,20 @@ class _ParsedUrl:
 
 
 def send_request(
-    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], others: Networks, most_bytes: int = 0
+    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], allowlist: Networks, most_bytes: int = 0
 ) -> HttpResponse:
     """Send a request and return the response, without following redirections.
 
-    ``others`` are permitted networks in addition to public addresses. Raises NotReached.
+    ``allowlist`` are permitted networks in addition to public addresses. Raises NotReached.
     """
     target = _parse_url(url)
-    addresses = _resolve_addresses(target, others)
+    addresses = _resolve_addresses(target, allowlist)
     try:
         sock = _open_socket(target, addresses)
         # Each read has its own time limit; this one stops a server that sends single bytes.
-        ending = Timer(TIMEOUT_SECONDS, _shut_down_socket, [sock])
-        ending.daemon = True
-        ending.start()
+        timer = Timer(TIMEOUT_SECONDS, _shut_down_socket, [sock])
+        timer.daemon = True
+        timer.start()
         with (
             closing(sock),
             closing(http.client.HTTPConnection(target.host, target.port, timeout=TIMEOUT_SECONDS)) as connection,
@@ -90,11 +90,11 @@ def send_request(
                 answer = _send_on_socket(connection, sock, target, method, body, headers, most_bytes)
             finally:
                 # If the timer has fired, the response is incomplete.
-                late = ending.finished.is_set()
-                ending.cancel()
+                is_late = timer.finished.is_set()
+                timer.cancel()
     except (OSError, http.client.HTTPException, ValueError) as error:
         raise RequestFailure(f"{target.host} did not answer: {type(error).__name__}") from None
-    if late:
+    if is_late:
         raise RequestFailure(f"{target.host} did not answer within {TIMEOUT_SECONDS:g} seconds")
     return answer
 
@@ -112,12 +112,12 @@ def _send_on_socket(
         sock.do_handshake()
     connection.sock = sock
     host = f"[{target.host}]" if ":" in target.host else target.host
-    usual = {"https": 443, "http": 80}[target.scheme]
-    named = host if target.port == usual else f"{host}:{target.port}"
-    connection.request(method, target.path, body, {"Host": named, "Connection": "close", **headers})
+    default_port = {"https": 443, "http": 80}[target.scheme]
+    host_header = host if target.port == default_port else f"{host}:{target.port}"
+    connection.request(method, target.path, body, {"Host": host_header, "Connection": "close", **headers})
     answer = connection.getresponse()
-    told = {name.lower(): value for name, value in answer.getheaders()}
-    return HttpResponse(answer.status, told, answer.read(most_bytes + 1) if most_bytes else b"")
+    response_headers = {name.lower(): value for name, value in answer.getheaders()}
+    return HttpResponse(answer.status, response_headers, answer.read(most_bytes + 1) if most_bytes else b"")
 
 
 def _parse_url(url: str) -> _ParsedUrl:
@@ -132,54 +132,58 @@ def _parse_url(url: str) -> _ParsedUrl:
     return _ParsedUrl(parts.scheme, parts.hostname, port, path)
 
 
-def _resolve_addresses(target: _ParsedUrl, others: Networks) -> list[str]:
+def _resolve_addresses(target: _ParsedUrl, allowlist: Networks) -> list[str]:
     """Return the addresses to connect to.
 
-    Raises NotReached if the name is unknown, or any address is neither public nor in ``others``. The message is the
+    Raises NotReached if the name is unknown, or any address is neither public nor in ``allowlist``. The message is the
     same for both, because it would otherwise reveal internal names.
     """
     try:
-        found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_ADDRESSES]
+        address_infos = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_ADDRESSES]
     except (OSError, UnicodeError):
-        found = []
-    addresses = [str(each[4][0]) for each in found]
-    if not addresses or not all(is_public(each) or _is_in_networks(each, others) for each in addresses):
+        address_infos = []
+    addresses = [str(each[4][0]) for each in address_infos]
+    if not addresses or not all(is_public(each) or _is_in_networks(each, allowlist) for each in addresses):
         raise RequestFailure(f"{target.host} is not the name of a public address")
     return addresses
 
 
 def _open_socket(target: _ParsedUrl, addresses: Sequence[str]) -> socket.socket:
     """Connect to the first reachable address, before any TLS handshake. Raises OSError."""
-    for place, address in enumerate(addresses, start=1):
+    for attempt, address in enumerate(addresses, start=1):
         try:
-            plain = socket.create_connection((address, target.port), timeout=TIMEOUT_SECONDS / len(addresses))
+            connection = socket.create_connection((address, target.port), timeout=TIMEOUT_SECONDS / len(addresses))
             break
         except OSError:
-            if place == len(addresses):
+            if attempt == len(addresses):
                 raise
-    plain.settimeout(TIMEOUT_SECONDS)
+    connection.settimeout(TIMEOUT_SECONDS)
     if target.scheme == "http":
-        return plain
+        return connection
     context = ssl.create_default_context()
-    return context.wrap_socket(plain, server_hostname=target.host, do_handshake_on_connect=False)
+    return context.wrap_socket(connection, server_hostname=target.host, do_handshake_on_connect=False)
 
 
 def _is_in_networks(address: str, networks: Networks) -> bool:
-    found = ip_address(address.partition("%")[0])
-    return any(found in network for network in networks)
+    parsed_address = ip_address(address.partition("%")[0])
+    return any(parsed_address in network for network in networks)
 
 
 def is_public(address: str) -> bool:
     """Return whether an address is public and does not embed one that is not."""
-    found = ip_address(address.partition("%")[0])
-    if isinstance(found, IPv6Address):
+    parsed_address = ip_address(address.partition("%")[0])
+    if isinstance(parsed_address, IPv6Address):
         # An address that embeds an IPv4 address is as public as that one; translators accept unchecked addresses.
-        carried = found.ipv4_mapped or found.sixtofour or (found.teredo and found.teredo[1])
-        if carried:
-            return is_public(str(carried))
-    if any(found in network for network in _NON_PUBLIC_NETWORKS):
+        embedded_address = (
+            parsed_address.ipv4_mapped
+            or parsed_address.sixtofour
+            or (parsed_address.teredo and parsed_address.teredo[1])
+        )
+        if embedded_address:
+            return is_public(str(embedded_address))
+    if any(parsed_address in network for network in _NON_PUBLIC_NETWORKS):
         return False
-    return found.is_global and not (found.is_multicast or found.is_reserved)
+    return parsed_address.is_global and not (parsed_address.is_multicast or parsed_address.is_reserved)
 
 
 def _shut_down_socket(sock: socket.socket) -> None:

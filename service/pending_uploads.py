@@ -76,8 +76,8 @@ class PendingUploads:
         """
         self._folder.mkdir(mode=0o700, exist_ok=True)
         uploads = self._list_recent()
-        own = [upload for upload in uploads if upload.person_id == person_id]
-        for upload in own[: max(0, len(own) - _MOST_OF_ONE + 1)]:
+        own_folders = [upload for upload in uploads if upload.person_id == person_id]
+        for upload in own_folders[: max(0, len(own_folders) - _MOST_OF_ONE + 1)]:
             self.remove(upload)
             uploads.remove(upload)
         while len(uploads) >= _MOST_OF_ALL:
@@ -99,16 +99,16 @@ class PendingUploads:
 
     def find(self, upload_id: str, person_id: int, course_id: int) -> PendingUpload | None:
         """Return an upload of this sender to this course, or None if it does not exist or has expired."""
-        found = self._read_metadata(upload_id) if upload_id.isalnum() else None
-        if found is None or (found.person_id, found.course_id) != (person_id, course_id):
+        upload = self._read_metadata(upload_id) if upload_id.isalnum() else None
+        if upload is None or (upload.person_id, upload.course_id) != (person_id, course_id):
             return None
-        return found
+        return upload
 
     def list_waiting(self, person_id: int, course_id: int) -> list[PendingUpload]:
         """Return the uploads of this sender to this course that were read but neither confirmed nor discarded."""
         names = [path.name for path in self._folder.iterdir()] if self._folder.is_dir() else []
-        found = [each for name in sorted(names) if (each := self.find(name, person_id, course_id)) is not None]
-        return [each for each in found if each.expected or each.refusals]
+        uploads = [each for name in sorted(names) if (each := self.find(name, person_id, course_id)) is not None]
+        return [each for each in uploads if each.expected or each.refusals]
 
     def remove(self, upload: PendingUpload) -> None:
         """Delete an upload."""
@@ -129,7 +129,7 @@ class PendingUploads:
         """Return the path of the table of people, or None."""
         return self._folder / upload.id / "people" / upload.people if upload.people else None
 
-    def store_files(self, upload: PendingUpload, files: Sequence[UploadedFile], into: str) -> list[str]:
+    def store_files(self, upload: PendingUpload, files: Sequence[UploadedFile], subfolder: str) -> list[str]:
         """Copy files into a folder of the upload and return their names there.
 
         Raises:
@@ -137,7 +137,7 @@ class PendingUploads:
         """
         if len(files) > _MOST_FILES:
             raise UsageError(f"{len(files)} files were uploaded, expected at most {_MOST_FILES}, or one zip of them")
-        folder = self._folder / upload.id / into
+        folder = self._folder / upload.id / subfolder
         try:
             folder.mkdir(mode=0o700)
             return [_store_file(folder, file) for file in files]
@@ -186,9 +186,9 @@ def _read_time(path: Path) -> float:
         return time.time()
 
 
-def clean_file_name(sent: UploadedFile) -> str:
+def clean_file_name(file: UploadedFile) -> str:
     """Return a safe file name without folders. Raises UsageError if it is empty or too long."""
-    name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in sent.flat_name).strip().lstrip(".")
+    name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in file.flat_name).strip().lstrip(".")
     if not name:
         raise UsageError("a file without a name was uploaded, expected a name that identifies its student")
     if len(name.encode()) > _LONGEST_NAME:

@@ -68,15 +68,15 @@ def write_report(
     grade: Grade,
     folder: Path,
     stem: str,
-    over: JobLine | None = None,
+    overlay_line: JobLine | None = None,
     language: Language = ENGLISH,
 ) -> WrittenReport:
-    """Write the page of a graded job as ``stem``.html; its replay overlays the trials of ``over``.
+    """Write the page of a graded job as ``stem``.html; its replay overlays the trials of ``overlay_line``.
 
     Raises UsageError if the folder is not writable, or the reader may not see those trials.
     """
-    html, drawn = _render_page(store, line, grade, over, language)
-    return WrittenReport(write_page(folder, f"{stem}.html", html), drawn)
+    html, drawn_plots = _render_page(store, line, grade, overlay_line, language)
+    return WrittenReport(write_page(folder, f"{stem}.html", html), drawn_plots)
 
 
 def write_grade_replay(
@@ -84,10 +84,10 @@ def write_grade_replay(
     line: JobLine,
     grade: Grade,
     path: Path,
-    over: JobLine | None = None,
+    overlay_line: JobLine | None = None,
     language: Language = ENGLISH,
 ) -> None:
-    """Write the replay of all visible trials of a graded job, overlaid with those of ``over``.
+    """Write the replay of all visible trials of a graded job, overlaid with those of ``overlay_line``.
 
     Raises UsageError if the file cannot be written, or the reader may not see those trials.
     """
@@ -95,8 +95,8 @@ def write_grade_replay(
         submission = intake.load_submission(session, line.id)
         floors = load_own_floors(intake.load_assignment(session, line.id))
         view = _build_view(session, line, grade, language)
-        others = _load_other_trials(session, line, view, over)
-    write_replay(path, build_grade_replay(view, submission, floors, others=others), language)
+        overlay_trials = _load_other_trials(session, line, view, overlay_line)
+    write_replay(path, build_grade_replay(view, submission, floors, overlay_trials=overlay_trials), language)
 
 
 def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, number: int | None) -> None:
@@ -106,13 +106,13 @@ def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, numb
     """
     with store.reading() as session:
         floors = load_own_floors(intake.load_assignment(session, line.id))
-        seen = _build_view(session, line, grade).grade
-    if not seen.trials:
+        visible_grade = _build_view(session, line, grade).grade
+    if not visible_grade.trials:
         raise UsageError(f"{line.id} has no visible trial, so there is no film")
-    if number is not None and not 1 <= number <= len(seen.trials):
-        raise UsageError(f"--trial {number}: expected 1 to {len(seen.trials)}, as the replay numbers them")
-    index = find_worst_trial(seen, list_scenarios(seen)[0]) if number is None else number - 1
-    write_film(path, seen.trials[index], floors)
+    if number is not None and not 1 <= number <= len(visible_grade.trials):
+        raise UsageError(f"--trial {number}: expected 1 to {len(visible_grade.trials)}, as the replay numbers them")
+    index = find_worst_trial(visible_grade, list_scenarios(visible_grade)[0]) if number is None else number - 1
+    write_film(path, visible_grade.trials[index], floors)
 
 
 def render_report_pages(
@@ -136,22 +136,22 @@ def write_batch_reports(
     Pages are named after the student, and after the assignment if a student has several. Raises UsageError if the
     folder is not writable.
     """
-    graded = [line for line in lines if not describe_missing_grade(line)]
-    names = [(line.student, line.assignment) for line in graded]
+    graded_lines = [line for line in lines if not describe_missing_grade(line)]
+    names = [(line.student, line.assignment) for line in graded_lines]
     stems = [
         *build_file_stems(names),
         *build_refused_stems([(refusal.source, refusal.student.id) for refusal in refusals]),
     ]
-    pages = render_report_pages(store, graded, refusals)
+    pages = render_report_pages(store, graded_lines, refusals)
     paths = [write_page(folder, f"{stem}.html", page.html) for stem, page in zip(stems, pages, strict=True)]
-    own = {line.id: path.name for line, path in zip(graded, paths, strict=False)}
+    page_names = {line.id: path.name for line, path in zip(graded_lines, paths, strict=False)}
     rows = [
         BatchRow(
             line.student,
             line.marks,
             line.max_marks,
             None if line.verdict is None else Verdict(line.verdict),
-            own.get(line.id),
+            page_names.get(line.id),
             describe_missing_grade(line) or describe_missing_part(line.missing),
             line.name if line.name != line.student else "",
         )
@@ -164,7 +164,7 @@ def write_batch_reports(
             note=f"rejected: {refusal.sentence}",
             name=refusal.student.name if refusal.student.name != refusal.student.id else "",
         )
-        for refusal, path in zip(refusals, paths[len(graded) :], strict=True)
+        for refusal, path in zip(refusals, paths[len(graded_lines) :], strict=True)
     ]
     sandbox = ", ".join(sorted({line.sandbox for line in lines if line.sandbox}))
     rows.sort(key=lambda row: row.student)
@@ -193,13 +193,13 @@ def render_each_report(
 
     All data is read with a fixed number of statements. ``views`` must match ``job_ids``, ordered by id.
     """
-    submissions, drawn = intake.load_each_submission(session, job_ids), plots.load_each_plots(session, job_ids)
+    submissions, all_plots = intake.load_each_submission(session, job_ids), plots.load_each_plots(session, job_ids)
     floors: dict[tuple[str, str], Mapping[str, Pixels]] = {}
-    for (job_id, view), (_, submission), (_, plotted) in zip(views, submissions, drawn, strict=True):
+    for (job_id, view), (_, submission), (_, report_plots) in zip(views, submissions, all_plots, strict=True):
         version = (view.grade.assignment, view.grade.assignment_version)
         if not _has_built_in_floors(view) and version not in floors:
             floors[version] = load_own_floors(intake.load_assignment(session, job_id))
-        page = partial(render_report_page, view, plotted, submission, floors.get(version, {}))
+        page = partial(render_report_page, view, report_plots, submission, floors.get(version, {}))
         yield job_id, view, render_or_explain(view, page)
 
 
@@ -208,34 +208,36 @@ def _has_built_in_floors(view: View) -> bool:
 
 
 def _load_report_data(
-    store: Store, job_id: str, plotted: PlotState, view: View
+    store: Store, job_id: str, plot_state: PlotState, view: View
 ) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
     """Load the plots, the submission and the floors of a report."""
     with store.reading() as session:
         submission = intake.load_submission(session, job_id)
-        drawn = plots.load_plots(session, job_id) if plotted is PlotState.DONE else {}
+        drawn_plots = plots.load_plots(session, job_id) if plot_state is PlotState.DONE else {}
         floors = {} if _has_built_in_floors(view) else load_own_floors(intake.load_assignment(session, job_id))
-    return drawn, submission, floors
+    return drawn_plots, submission, floors
 
 
 def _render_page(
-    store: Store, line: JobLine, grade: Grade, over: JobLine | None = None, language: Language = ENGLISH
+    store: Store, line: JobLine, grade: Grade, overlay_line: JobLine | None = None, language: Language = ENGLISH
 ) -> tuple[str, Mapping[str, bytes]]:
     """Return the page of a graded job, and its plots."""
     with store.reading() as session:
         submission = intake.load_submission(session, line.id)
         view = _build_view(session, line, grade, language)
-        others = _load_other_trials(session, line, view, over)
-        drawn = plots.load_plots(session, line.id) if line.plots is PlotState.DONE else None
-        built_in = {trial.recording.background for trial in grade.trials} <= set(list_floor_names())
-        assignment = None if drawn is not None and built_in else intake.load_assignment(session, line.id)
-    shown = dict(drawn or {})
+        overlay_trials = _load_other_trials(session, line, view, overlay_line)
+        drawn_plots = plots.load_plots(session, line.id) if line.plots is PlotState.DONE else None
+        has_built_in_floors = {trial.recording.background for trial in grade.trials} <= set(list_floor_names())
+        assignment = (
+            None if drawn_plots is not None and has_built_in_floors else intake.load_assignment(session, line.id)
+        )
+    shown = dict(drawn_plots or {})
 
     def render() -> str:
-        if drawn is None and assignment is not None:
+        if drawn_plots is None and assignment is not None:
             shown.update(draw_plots(grade, assignment, submission))
         floors = load_own_floors(assignment) if assignment is not None else {}
-        return render_report_page(view, shown, submission, floors, others)
+        return render_report_page(view, shown, submission, floors, overlay_trials)
 
     return render_or_explain(view, render), shown
 
@@ -247,30 +249,32 @@ def _build_view(session: Session, line: JobLine, grade: Grade, language: Languag
     return build_student_view(grade, policies.load_visibilities(session, line.id), language)
 
 
-def _load_other_trials(session: Session, line: JobLine, view: View, over: JobLine | None) -> OverlayTrials:
-    """Return the trials of ``over`` that the reader of the view may see."""
-    if over is None:
+def _load_other_trials(session: Session, line: JobLine, view: View, overlay_line: JobLine | None) -> OverlayTrials:
+    """Return the trials of ``overlay_line`` that the reader of the view may see."""
+    if overlay_line is None:
         return NO_OVERLAY
-    reason = describe_missing_grade(over)
-    if not reason and over.standing is Standing.PROPOSED:
+    reason = describe_missing_grade(overlay_line)
+    if not reason and overlay_line.standing is Standing.PROPOSED:
         reason = "a regrade that is not published"
-    if reason and (over.state is not JobState.DONE or not view.staff):
-        raise UsageError(f"{over.id} cannot be shown over {line.id}: {reason}")
+    if reason and (overlay_line.state is not JobState.DONE or not view.staff):
+        raise UsageError(f"{overlay_line.id} cannot be shown over {line.id}: {reason}")
     try:
         return select_overlay_trials(
             view,
-            results.load_grade(session, over.id),
-            _label_overlay(over, line),
+            results.load_grade(session, overlay_line.id),
+            _label_overlay(overlay_line, line),
             policies.load_visibilities(session, line.id),
         )
     except UsageError as error:
-        raise UsageError(f"{over.id} cannot be shown over {line.id}: {error}") from None
+        raise UsageError(f"{overlay_line.id} cannot be shown over {line.id}: {error}") from None
 
 
-def _label_overlay(over: JobLine, line: JobLine) -> str:
+def _label_overlay(overlay_line: JobLine, line: JobLine) -> str:
     """Return the label of the overlaid trials in the report of ``line``."""
-    if over.student == REFERENCE:
+    if overlay_line.student == REFERENCE:
         return "the reference"
-    if over.student != line.student:
-        return over.student
-    return f"attempt {over.attempt}" + (f", grade {over.id}" if over.attempt == line.attempt else "")
+    if overlay_line.student != line.student:
+        return overlay_line.student
+    return f"attempt {overlay_line.attempt}" + (
+        f", grade {overlay_line.id}" if overlay_line.attempt == line.attempt else ""
+    )

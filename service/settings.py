@@ -40,9 +40,9 @@ def _define_setting(read: Callable[[Any], Any], **default: Any) -> Any:
     return field(**default, metadata={_PARSER: read})
 
 
-def _parse_folder(written: str | Path) -> Path:
+def _parse_folder(value: str | Path) -> Path:
     try:
-        return Path(written).expanduser().absolute()
+        return Path(value).expanduser().absolute()
     except RuntimeError:
         raise ValueError("expected a folder; this user has no home folder") from None
 
@@ -61,12 +61,12 @@ def _parse_database_url(url: str) -> str:
     from sqlalchemy.exc import ArgumentError
 
     try:
-        parsed = make_url(url)
-        kind = parsed.get_backend_name()
+        parsed_url = make_url(url)
+        kind = parsed_url.get_backend_name()
     except ArgumentError as error:
         raise ValueError("expected sqlite:///path or postgresql://user@host/name") from error
-    in_memory = kind == "sqlite" and parsed.database in (None, "", ":memory:")
-    if kind not in {"sqlite", "postgresql"} or in_memory:
+    is_in_memory = kind == "sqlite" and parsed_url.database in (None, "", ":memory:")
+    if kind not in {"sqlite", "postgresql"} or is_in_memory:
         raise ValueError("expected sqlite:///path or postgresql://user@host/name")
     return url
 
@@ -78,24 +78,24 @@ def _parse_address(url: str) -> str:
     return url.rstrip("/")
 
 
-def split_names(written: str) -> tuple[str, ...]:
+def split_names(value: str) -> tuple[str, ...]:
     """Split a comma-separated list."""
-    return tuple(part for each in written.split(",") if (part := each.strip().lower()))
+    return tuple(part for each in value.split(",") if (part := each.strip().lower()))
 
 
-def _parse_networks(written: str) -> str:
-    for each in split_names(written):
+def _parse_networks(value: str) -> str:
+    for network in split_names(value):
         try:
-            ip_network(each)
+            ip_network(network)
         except ValueError:
             raise ValueError("expected addresses or networks with commas between, like 127.0.0.1, 10.0.0.0/8") from None
-    return ",".join(split_names(written))
+    return ",".join(split_names(value))
 
 
-def _parse_host_names(written: str) -> str:
-    if not all(re.fullmatch(r"[a-z0-9]([a-z0-9._-]*[a-z0-9])?", each) for each in split_names(written)):
+def _parse_host_names(value: str) -> str:
+    if not all(re.fullmatch(r"[a-z0-9]([a-z0-9._-]*[a-z0-9])?", each) for each in split_names(value)):
         raise ValueError("expected names without ports, with commas between, like web, robomark.internal")
-    return ",".join(split_names(written))
+    return ",".join(split_names(value))
 
 
 def _parse_log_level(level: str) -> str:
@@ -104,47 +104,47 @@ def _parse_log_level(level: str) -> str:
     return level.upper()
 
 
-def _parse_secret(given: str | Secret) -> Secret:
-    text = given.text if isinstance(given, Secret) else given.strip()
+def _parse_secret(value: str | Secret) -> Secret:
+    text = value.text if isinstance(value, Secret) else value.strip()
     if 0 < len(text) < _SHORTEST_SECRET:
         raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that are hard to guess")
     return Secret(text)
 
 
-def _parse_boolean(written: str | bool) -> bool:
-    known = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
-    if str(written).lower() not in known:
+def _parse_boolean(value: str | bool) -> bool:
+    booleans = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+    if str(value).lower() not in booleans:
         raise ValueError("expected true or false")
-    return known[str(written).lower()]
+    return booleans[str(value).lower()]
 
 
-def _build_seconds_parser(least: float, most: float) -> Callable[[Any], float]:
-    def read(written: str | float) -> float:
+def _build_seconds_parser(minimum: float, maximum: float) -> Callable[[Any], float]:
+    def read(value: str | float) -> float:
         try:
-            number = float(written)
+            number = float(value)
         except ValueError:
             raise ValueError("input should be a valid number, unable to parse string as a number") from None
-        return _check_range(least, number, most)
+        return _check_range(minimum, number, maximum)
 
     return read
 
 
-def _build_count_parser(least: int, most: int) -> Callable[[Any], int]:
-    def read(written: str | int) -> int:
+def _build_count_parser(minimum: int, maximum: int) -> Callable[[Any], int]:
+    def read(value: str | int) -> int:
         try:
-            number = int(written)
+            number = int(value)
         except ValueError:
             raise ValueError("input should be a valid integer, unable to parse string as an integer") from None
-        return int(_check_range(least, number, most))
+        return int(_check_range(minimum, number, maximum))
 
     return read
 
 
-def _check_range(least: float, number: float, most: float) -> float:
-    if not number >= least:
-        raise ValueError(f"input should be greater than or equal to {least}")
-    if number > most:
-        raise ValueError(f"input should be less than or equal to {most}")
+def _check_range(minimum: float, number: float, maximum: float) -> float:
+    if not number >= minimum:
+        raise ValueError(f"input should be greater than or equal to {minimum}")
+    if number > maximum:
+        raise ValueError(f"input should be less than or equal to {maximum}")
     return number
 
 
@@ -193,13 +193,13 @@ class Settings:
     secret: Secret = field(default=PUBLIC_SECRET, metadata={_PARSER: _parse_secret})
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            given = getattr(self, each.name)
+        for setting in fields(self):
+            value = getattr(self, setting.name)
             try:
-                object.__setattr__(self, each.name, each.metadata[_PARSER](given))
+                object.__setattr__(self, setting.name, setting.metadata[_PARSER](value))
             except ValueError as error:
-                shown = "not usable" if each.name == "secret" else repr(given)
-                raise UsageError(f"{_format_variable(each.name)} is {shown}: {error}") from None
+                value_text = "not usable" if setting.name == "secret" else repr(value)
+                raise UsageError(f"{_format_variable(setting.name)} is {value_text}: {error}") from None
 
     @property
     def own_secret(self) -> Secret | None:
@@ -217,8 +217,8 @@ class Settings:
 
     def to_environment(self) -> dict[str, str]:
         """Return the variables that give a child process the same settings, except the secret, which it inherits."""
-        told = {name: str(value) for name, value in asdict(self).items() if name != "secret"}
-        return {_format_variable(name): text for name, text in told.items() if text}
+        texts = {name: str(value) for name, value in asdict(self).items() if name != "secret"}
+        return {_format_variable(name): text for name, text in texts.items() if text}
 
 
 def load_settings(**overrides: object) -> Settings:
@@ -230,8 +230,8 @@ def load_settings(**overrides: object) -> Settings:
     folder = os.environ.get(SECRET_FILES) or None
     if folder is not None and not Path(folder).is_dir():
         raise UsageError(f"{SECRET_FILES} is {folder!r}: expected a folder with a file for each setting")
-    written = ({} if folder is None else _read_secret_files(Path(folder))) | _filter_settings(os.environ)
-    return Settings(**(written | overrides))  # type: ignore[arg-type]
+    values = ({} if folder is None else _read_secret_files(Path(folder))) | _filter_settings(os.environ)
+    return Settings(**(values | overrides))  # type: ignore[arg-type]
 
 
 def _read_secret_files(folder: Path) -> dict[str, str]:
@@ -243,10 +243,10 @@ def _read_secret_files(folder: Path) -> dict[str, str]:
     return {name: text for name, text in texts.items() if text}
 
 
-def _filter_settings(named: Mapping[str, Written]) -> dict[str, Written]:
+def _filter_settings(raw_values: Mapping[str, Written]) -> dict[str, Written]:
     """Return the values that belong to settings, skipping empty ones."""
     variables = {_format_variable(each.name): each.name for each in fields(Settings)}
-    return {variables[name.upper()]: found for name, found in named.items() if name.upper() in variables and found}
+    return {variables[name.upper()]: found for name, found in raw_values.items() if name.upper() in variables and found}
 
 
 def _format_variable(name: str) -> str:

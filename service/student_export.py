@@ -31,8 +31,8 @@ from submissions.student_names import normalise_name
 _AT_ONCE = 10
 
 
-def export_student(store: Store, enrolment_id: int, without: Set[str] = frozenset()) -> bytes:
-    """Return the zip, without the submissions to the assignments in ``without``.
+def export_student(store: Store, enrolment_id: int, hidden_assignments: Set[str] = frozenset()) -> bytes:
+    """Return the zip, without the submissions to the assignments in ``hidden_assignments``.
 
     With such assignments, times of sign-ins and of the enrolment are left out, too. Like times and sizes of
     submissions, they could identify the student's rows among hidden names.
@@ -43,32 +43,34 @@ def export_student(store: Store, enrolment_id: int, without: Set[str] = frozense
         query = query.join(Person, Enrolment.person_id == Person.id).where(Enrolment.id == enrolment_id)
         enrolment, course, person = session.execute(query).one()
         student = _build_student(session, enrolment, course) | (
-            {} if without else _load_times(session, enrolment, person)
+            {} if hidden_assignments else _load_times(session, enrolment, person)
         )
-        mine = and_(SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without))
-        folders, told = {}, []
-        for submission_id, document, packed in _load_submissions(session, mine):
+        condition = and_(
+            SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(hidden_assignments)
+        )
+        folders, documents = {}, []
+        for submission_id, document, packed_submission in _load_submissions(session, condition):
             folder = f"submissions/{_clean_name(document['assignment'])}-{document['attempt']}"
-            archive.writestr(f"{folder}/submission.zip", packed)
+            archive.writestr(f"{folder}/submission.zip", packed_submission)
             folders[submission_id] = folder
-            told.append({**document, "folder": folder})
-        for submission_id, view, report in _load_seen_grades(session, mine):
+            documents.append({**document, "folder": folder})
+        for submission_id, view, report in _load_seen_grades(session, condition):
             archive.writestr(f"{folders[submission_id]}/grade.json", _encode_json(build_json_document(view)))
             archive.writestr(f"{folders[submission_id]}/report.html", report)
         runs = []
-        for number, (document, files) in enumerate(_load_test_runs(session, enrolment_id, without), 1):
+        for number, (document, files) in enumerate(_load_test_runs(session, enrolment_id, hidden_assignments), 1):
             folder = f"test-runs/{_clean_name(document['assignment'])}-{number}"
             for name, data in files.items():
                 archive.writestr(f"{folder}/{name}", data)
             runs.append({**document, "folder": folder})
-        rejected = _load_rejected_files(session, enrolment, without)
-        document = {**student, "submissions": told, "test_runs": runs, "rejected_files": rejected}
+        rejected = _load_rejected_files(session, enrolment, hidden_assignments)
+        document = {**student, "submissions": documents, "test_runs": runs, "rejected_files": rejected}
         archive.writestr("student.json", _encode_json(document))
     return sink.getvalue()
 
 
 def _build_student(session: Session, enrolment: Enrolment, course: str) -> dict[str, Any]:
-    allowed = select(Extension).where(Extension.enrolment_id == enrolment.id).order_by(Extension.id)
+    extension_query = select(Extension).where(Extension.enrolment_id == enrolment.id).order_by(Extension.id)
     return {
         "course": course,
         "id": enrolment.student,
@@ -77,46 +79,50 @@ def _build_student(session: Session, enrolment: Enrolment, course: str) -> dict[
         "email": enrolment.email,
         "role": enrolment.role.value,
         "extensions": [
-            _read_columns(row, ("assignment", "due_at", "more_attempts")) for row in session.scalars(allowed)
+            _read_columns(row, ("assignment", "due_at", "more_attempts")) for row in session.scalars(extension_query)
         ],
     }
 
 
 def _load_times(session: Session, enrolment: Enrolment, person: Person) -> dict[str, Any]:
     """Return the times of enrolment and sign-ins that belong to this course."""
-    here = Credential.course_id == enrolment.course_id
+    is_course_credential = Credential.course_id == enrolment.course_id
     if not membership.has_other_access(session, enrolment):
         # The student has only this course, so unlimited credentials belong to it, too.
-        here = or_(here, Credential.course_id.is_(None))
-    signs_in = select(Credential).where(Credential.person_id == person.id, here).order_by(Credential.created_at)
+        is_course_credential = or_(is_course_credential, Credential.course_id.is_(None))
+    query = (
+        select(Credential)
+        .where(Credential.person_id == person.id, is_course_credential)
+        .order_by(Credential.created_at)
+    )
     names = ("kind", "name", "created_at", "expires_at", "used_at", "revoked_at")
     return {
         "since": person.created_at.date(),
-        "signed_in_with": [_read_columns(row, names) for row in session.scalars(signs_in)],
+        "signed_in_with": [_read_columns(row, names) for row in session.scalars(query)],
     }
 
 
-def _load_submissions(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
+def _load_submissions(session: Session, condition: ColumnElement[bool]) -> Iterator[tuple[int, dict[str, Any], bytes]]:
     """Yield the id, the data and the packed files of each submission, ordered by id."""
-    asked = select(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id).where(mine)
+    appeal_query = select(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id).where(condition)
     appeals: dict[int, list[Appeal]] = {}
-    for appeal in session.scalars(asked.order_by(Appeal.id)):
+    for appeal in session.scalars(appeal_query.order_by(Appeal.id)):
         appeals.setdefault(appeal.submission_id, []).append(appeal)
     names = ("assignment", "attempt", "source", "sha256", "created_at", "submitted_at", "days_late", "staff_only")
     columns = ("text", "asked_at", "answer", "answered_at")
-    query = select(SubmissionRow, SubmissionRow.packed).where(mine).order_by(SubmissionRow.id)
-    for row, packed in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
-        own = [_read_columns(each, columns) for each in appeals.get(row.id, ())]
-        yield row.id, {**_read_columns(row, names), "appeals": own}, packed
+    query = select(SubmissionRow, SubmissionRow.packed).where(condition).order_by(SubmissionRow.id)
+    for row, packed_submission in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+        appeal_fields = [_read_columns(each, columns) for each in appeals.get(row.id, ())]
+        yield row.id, {**_read_columns(row, names), "appeals": appeal_fields}, packed_submission
 
 
-def _load_seen_grades(session: Session, mine: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
+def _load_seen_grades(session: Session, condition: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
     """Yield the id, view and report of each submission whose grade the student may see."""
     query = select(Job.id, Job.submission_id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    submission_of = dict(session.execute(query.where(mine, *current_grades.CAN_COUNT)).all())
-    released = policies.load_visibilities_by_job(session, submission_of)
-    graded = results.load_each_grade(session, submission_of)
-    views = ((job_id, build_student_view(grade, released[job_id])) for job_id, grade in graded)
+    submission_of = dict(session.execute(query.where(condition, *current_grades.CAN_COUNT)).all())
+    visibilities = policies.load_visibilities_by_job(session, submission_of)
+    grades = results.load_each_grade(session, submission_of)
+    views = ((job_id, build_student_view(grade, visibilities[job_id])) for job_id, grade in grades)
     for job_id, view, report in render_each_report(session, views, submission_of):
         yield submission_of[job_id], view, report
 

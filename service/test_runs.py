@@ -49,24 +49,24 @@ def build_single_trial_assignment(assignment: Assignment) -> Assignment | None:
 
     It depends on no secret, has no marks, and allows no more than the original assignment.
     """
-    shown = next((each for each in assignment.scenarios if each.visibility == "visible"), None)
-    if shown is None or assignment.training is not None:
+    visible_scenario = next((each for each in assignment.scenarios if each.visibility == "visible"), None)
+    if visible_scenario is None or assignment.training is not None:
         return None
     limits = assignment.limits
-    once = replace(
-        shown,
-        poses=shown.poses[:1],
-        second_poses=shown.second_poses[:1],
+    single_trial = replace(
+        visible_scenario,
+        poses=visible_scenario.poses[:1],
+        second_poses=visible_scenario.second_poses[:1],
         choose="each",
         trials=1,
-        seconds=min(shown.seconds, LONGEST_SECONDS),
-        light_noise=shown.light_noise[:1],
-        motor_noise=shown.motor_noise[:1],
+        seconds=min(visible_scenario.seconds, LONGEST_SECONDS),
+        light_noise=visible_scenario.light_noise[:1],
+        motor_noise=visible_scenario.motor_noise[:1],
         sweep=NO_SWEEP,
     )
     return replace(
         assignment,
-        scenarios=(once,),
+        scenarios=(single_trial,),
         # The same imports are forbidden as in the assignment.
         criteria=tuple(each for each in assignment.criteria if isinstance(each, SourceRules)),
         limits=replace(
@@ -82,33 +82,35 @@ def build_single_trial_assignment(assignment: Assignment) -> Assignment | None:
 
 
 def execute_test_run(
-    submission: Submission, once: Assignment, runner: TrialRunner, observe: ProgressObserver
+    submission: Submission, assignment: Assignment, runner: TrialRunner, observe: ProgressObserver
 ) -> RunResult:
     """Run a submission in the trial of a ``build_single_trial_assignment``. Raises like ``grade``."""
-    graded = grade(submission, once, secret=PUBLIC_SECRET, runner=runner, observe=observe)
-    run = replace(graded, criteria=(), hints=(), missing="", notes=_rephrase_notes(graded, submission))
-    replay = build_grade_replay(build_student_view(run), submission, load_own_floors(once)) if run.trials else None
+    full_grade = grade(submission, assignment, secret=PUBLIC_SECRET, runner=runner, observe=observe)
+    run = replace(full_grade, criteria=(), hints=(), missing="", notes=_rephrase_notes(full_grade, submission))
+    replay = (
+        build_grade_replay(build_student_view(run), submission, load_own_floors(assignment)) if run.trials else None
+    )
     return RunResult(run.verdict, _build_result(run, submission), compress_replay(replay) if replay else None)
 
 
-def _rephrase_notes(graded: Grade, submission: Submission) -> tuple[str, ...]:
+def _rephrase_notes(full_grade: Grade, submission: Submission) -> tuple[str, ...]:
     """Return the notes, with the note about a missing part rephrased for a run without marks."""
-    if not graded.missing:
-        return graded.notes
-    with_marks = {build_missing_part_note(part, submission.files) for part in PART_FILES}
-    others = tuple(note for note in graded.notes if note not in with_marks)
-    return (*others, f"There is no {graded.missing}, so only the other part was run.")
+    if not full_grade.missing:
+        return full_grade.notes
+    mark_notes = {build_missing_part_note(part, submission.files) for part in PART_FILES}
+    other_notes = tuple(note for note in full_grade.notes if note not in mark_notes)
+    return (*other_notes, f"There is no {full_grade.missing}, so only the other part was run.")
 
 
 def _build_result(run: Grade, submission: Submission) -> dict[str, Any]:
-    ended = describe_grade(run)
+    outcome = describe_grade(run)
     notes = (*run.notes, *(note for trial in run.trials for note in trial.recording.notes))
     faults = [fault for trial in run.trials for fault in collect_faults(trial.recording)]
     lines = [line for trial in run.trials for line in build_transcript(trial.recording)]
     return {
-        "tone": ended.tone,
-        "happened": ended.happened,
-        "whose": ended.whose,
+        "tone": outcome.tone,
+        "happened": outcome.happened,
+        "whose": outcome.whose,
         "seconds": run.trials[0].recording.end_t if run.trials else 0.0,
         "lines": [[round(t, 2), to_display_text(text, _LONGEST_LINE)] for t, text in lines[:_MOST_LINES]],
         "more_lines": max(0, len(lines) - _MOST_LINES),

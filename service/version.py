@@ -27,10 +27,10 @@ def describe_release_problem() -> str:
 
     Empty if there is none.
     """
-    installed = _find_version("robomark")
-    if installed == GRADER_VERSION:
+    installed_version = _find_version("robomark")
+    if installed_version == GRADER_VERSION:
         return ""
-    return f"the installed release ({installed}) differs from the running one ({GRADER_VERSION}); restart"
+    return f"the installed release ({installed_version}) differs from the running one ({GRADER_VERSION}); restart"
 
 
 @cache
@@ -54,7 +54,7 @@ def _find_version(distribution: str) -> str:
 
 
 def _list_grader_files() -> Iterator[Path]:
-    for room in _GRADER_FOLDERS:
-        for path in sorted((_ROOT / room).rglob("*")):
+    for folder in _GRADER_FOLDERS:
+        for path in sorted((_ROOT / folder).rglob("*")):
             if path.is_file() and _IGNORED_NAMES.isdisjoint(path.relative_to(_ROOT).parts):
                 yield path

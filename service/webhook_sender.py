@@ -29,9 +29,9 @@ _AT_ONCE = 8
 class WebhookSender:
     """Sends deliveries within a ``with`` block, to public addresses and to these networks."""
 
-    def __init__(self, store: Store, others: Networks) -> None:
+    def __init__(self, store: Store, allowlist: Networks) -> None:
         self._store = store
-        self._others = others
+        self._others = allowlist
         self._ended = Event()
         self._thread = Thread(target=self._run, name="webhooks", daemon=True)
 
@@ -67,15 +67,15 @@ def start_due_deliveries(store: Store, others: Networks, pool: Executor, most: i
     return {pool.submit(_send_delivery, store, each, others) for each in claimed}
 
 
-def sign_body(secret: str, at: int, body: bytes) -> str:
+def sign_body(secret: str, sent_at: int, body: bytes) -> str:
     """Return the value of the ``Robomark-Signature`` header for a body sent at this second."""
-    signed = hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
-    return f"t={at},v1={signed}"
+    signature = hmac.new(secret.encode(), f"{sent_at}.".encode() + body, hashlib.sha256).hexdigest()
+    return f"t={sent_at},v1={signature}"
 
 
-def _send_delivery(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
+def _send_delivery(store: Store, delivery: ClaimedDelivery, allowlist: Networks) -> None:
     try:
-        _send_and_record(store, claimed, others)
+        _send_and_record(store, delivery, allowlist)
     except Exception:
         # The delivery is repeated after its claim expires.
         _log.exception("webhooks.failed")
@@ -93,7 +93,7 @@ def _send_and_record(store: Store, claimed: ClaimedDelivery, others: Networks) -
         "Robomark-Signature": sign_body(claimed.secret, int(time.time()), body),
     }
     try:
-        status = send_request(claimed.url, method="POST", body=body, headers=headers, others=others).status
+        status = send_request(claimed.url, method="POST", body=body, headers=headers, allowlist=others).status
     except RequestFailure as error:
         outbox.record_failure(store, claimed, str(error))
         return

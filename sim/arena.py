@@ -127,15 +127,17 @@ class Arena:
 
     def find_contacts(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """Return the names of walls and obstacles that overlap the robot's body or are within half a millimetre."""
-        near = [(name, block) for name, box, block in self._blocks if measure_gap(box, x, y) <= robot.reach + TOUCH]
-        if not near:
+        nearby_blocks = [
+            (name, block) for name, box, block in self._blocks if measure_gap(box, x, y) <= robot.reach + TOUCH
+        ]
+        if not nearby_blocks:
             return ()
         body = self._body(robot)
         place_body(body, x, y, heading, self._client)
-        return tuple(name for name, block in near if self._is_in_contact(body, block))
+        return tuple(name for name, block in nearby_blocks if self._is_in_contact(body, block))
 
-    def _is_in_contact(self, body: int, other: int) -> bool:
-        return bool(pb.getClosestPoints(body, other, TOUCH * _METRE, physicsClientId=self._client.id))
+    def _is_in_contact(self, body: int, block: int) -> bool:
+        return bool(pb.getClosestPoints(body, block, TOUCH * _METRE, physicsClientId=self._client.id))
 
     def _body(self, robot: Robot) -> int:
         if robot.name not in self._bodies:
@@ -154,12 +156,19 @@ class Arena:
         vertices: list[list[float]] = []
         indices: list[int] = []
         for x1, y1, x2, y2 in lines:
-            first = len(vertices)
+            first_vertex = len(vertices)
             vertices += [
                 [x * _METRE, y * _METRE, z]
                 for x, y, z in ((x1, y1, -0.5), (x2, y2, -0.5), (x2, y2, 0.5), (x1, y1, 0.5))
             ]
-            indices += [first, first + 1, first + 2, first, first + 2, first + 3]
+            indices += [
+                first_vertex,
+                first_vertex + 1,
+                first_vertex + 2,
+                first_vertex,
+                first_vertex + 2,
+                first_vertex + 3,
+            ]
         shape = pb.createCollisionShape(
             pb.GEOM_MESH,
             vertices=vertices,

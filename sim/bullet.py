@@ -13,13 +13,13 @@ from types import ModuleType, TracebackType
 def _import_quietly() -> ModuleType:
     """Import PyBullet with stderr redirected, because C code prints the greeting."""
     sys.stderr.flush()
-    kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    stderr_copy, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, 2)
         import pybullet
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        os.dup2(stderr_copy, 2)
+        os.close(stderr_copy)
         os.close(null)
     return pybullet  # type: ignore[no-any-return]
 

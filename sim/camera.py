@@ -72,10 +72,10 @@ class BulletCamera:
             physicsClientId=self._client.id,
         )
         body = pb.createMultiBody(0, -1, shape, physicsClientId=self._client.id)
-        padded = np.pad(pixels, ((_PAD, _PAD), (_PAD, _PAD), (0, 0)))
+        padded_pixels = np.pad(pixels, ((_PAD, _PAD), (_PAD, _PAD), (0, 0)))
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "floor.bmp"
-            Image.fromarray(padded).save(file)
+            Image.fromarray(padded_pixels).save(file)
             texture = pb.loadTexture(str(file), physicsClientId=self._client.id)
         pb.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=self._client.id)
         self._render(0, 0, 2, light=True)
@@ -224,8 +224,8 @@ def _compute_disc_sums(tile: Bytes, side: int) -> memoryview:
     running = np.zeros((_TILE + side, _TILE + side + 1, 3), np.int64)
     np.cumsum(tile, axis=1, out=running[:, 1:])
     total = np.zeros((_TILE, _TILE, 3), np.int64)
-    for row, counted in enumerate(build_sensor_mask(side)):
-        columns = np.flatnonzero(counted)
+    for row, mask_row in enumerate(build_sensor_mask(side)):
+        columns = np.flatnonzero(mask_row)
         if columns.size:
             first, last = int(columns[0]), int(columns[-1]) + 1
             rows = running[row : row + _TILE]
@@ -236,22 +236,22 @@ def _compute_disc_sums(tile: Bytes, side: int) -> memoryview:
 class Cameras:
     """Small cache of cameras by image. Only the last one used keeps PyBullet open; the oldest is evicted."""
 
-    def __init__(self, most: int = 3) -> None:
+    def __init__(self, capacity: int = 3) -> None:
         """Create the cache. A camera's tiles take up to 50 MB once a robot has covered its floor."""
-        self._most = most
+        self._most = capacity
         # The keys are object ids. Holding the image prevents reuse of its id.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
     def open_camera(self, pixels: Bytes) -> CachedCamera:
         """Return the camera over the floor ``pixels``, which must not change afterwards."""
-        held = self._cameras.pop(id(pixels), None)
+        entry = self._cameras.pop(id(pixels), None)
         self.close()
-        if held is None:
+        if entry is None:
             while len(self._cameras) >= self._most:
                 self._cameras.popitem(last=False)
-            held = pixels, CachedCamera(pixels)
-        self._cameras[id(pixels)] = held
-        return held[1]
+            entry = pixels, CachedCamera(pixels)
+        self._cameras[id(pixels)] = entry
+        return entry[1]
 
     def close(self) -> None:
         """Release PyBullet's memory."""

@@ -69,9 +69,9 @@ def column(unit: str, source: str, **more: Any) -> Any:
 
 def collect_columns(table: type) -> tuple[Column, ...]:
     """Return the columns of a class, those of the chain first."""
-    found = (replace(each.metadata["column"], name=each.name) for each in fields(table) if "column" in each.metadata)
-    named = (
+    columns = (replace(each.metadata["column"], name=each.name) for each in fields(table) if "column" in each.metadata)
+    named_columns = (
         replace(each, display_attribute=each.display_attribute or each.name, reading=each.reading or each.source)
-        for each in found
+        for each in columns
     )
-    return tuple(sorted(named, key=lambda each: not each.in_chain))
+    return tuple(sorted(named_columns, key=lambda each: not each.in_chain))

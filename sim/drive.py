@@ -51,16 +51,16 @@ class Wheel:
             if self._position_target != self.position:
                 self.state = "running"
 
-    def change_speed(self, most: float, noise: float, both_directions: bool = False) -> None:
+    def change_speed(self, max_change: float, noise: float, both_directions: bool = False) -> None:
         """Move the speed towards its set point. Without ``both_directions``, negative speeds get no rounding or noise.
 
         Unlike the original, this method limits negative speeds. Otherwise a program that bypasses the brick's checks
         could ask for more than the motor's maximum and win every race.
         """
         if self.speed < self.speed_sp:
-            self.speed = min(self.speed + most, self.speed_sp)
+            self.speed = min(self.speed + max_change, self.speed_sp)
         elif self.speed > self.speed_sp:
-            self.speed = max(self.speed - most, self.speed_sp, -MAX_SPEED)
+            self.speed = max(self.speed - max_change, self.speed_sp, -MAX_SPEED)
         noisy = self.speed + noise
         if noisy >= 0:
             self.speed = min(round_half_up(noisy), MAX_SPEED)
@@ -82,8 +82,10 @@ class Wheel:
             if backwards:
                 degrees = -degrees
             self.position += degrees
-            passed = self.position < self._position_target if backwards else self.position > self._position_target
-            if passed:
+            is_past_target = (
+                self.position < self._position_target if backwards else self.position > self._position_target
+            )
+            if is_past_target:
                 self.state = ""
                 return 0.0
             self.position += degrees
@@ -118,23 +120,23 @@ class Drive:
 
     def tick(self, clock: int) -> None:
         """Advance by one tick: update the speeds, the wheel travel and the pose, in this order."""
-        most = self.robot.acceleration
-        both = self.both_directions and self.noise > 0
-        self.left.change_speed(most, self._noise(self.left_chance, clock), both)
-        self.right.change_speed(most, self._noise(self.right_chance, clock), both)
+        max_change = self.robot.acceleration
+        both_directions = self.both_directions and self.noise > 0
+        self.left.change_speed(max_change, self._noise(self.left_chance, clock), both_directions)
+        self.right.change_speed(max_change, self._noise(self.right_chance, clock), both_directions)
         mm_per_degree = math.pi * self.robot.wheel_diameter / 360
         left = self.left.travel(clock) * mm_per_degree
         right = self.right.travel(clock) * mm_per_degree
-        before = self.x, self.y
-        self.x, self.y, turned = self.motion.compute_move(self.x, self.y, self.heading, left, right)
-        if turned == 0.0 and (self.x, self.y) == before:
+        previous_position = self.x, self.y
+        self.x, self.y, rotation = self.motion.compute_move(self.x, self.y, self.heading, left, right)
+        if rotation == 0.0 and (self.x, self.y) == previous_position:
             self.gyro_rate = 0.0
             return
-        self.heading += turned
+        self.heading += rotation
         if self.heading > TWO_PI:
             self.heading -= TWO_PI
             self.turns += 1
-        degrees = math.degrees(turned)
+        degrees = math.degrees(rotation)
         self.gyro_angle -= degrees
         self.gyro_rate = -degrees * 30
 

@@ -50,28 +50,28 @@ class LightReader:
         self._mask = build_sensor_mask(sensor.diameter)
         self.pixels = int(self._mask.sum())
 
-    def measure_sums(self, where: Footprint, tick: int) -> tuple[int, int, int]:
+    def measure_sums(self, footprint: Footprint, tick: int) -> tuple[int, int, int]:
         """Return the sums of R, G and B over the sensor's pixels, including noise."""
         if self._noise <= 0:
-            return self._camera.measure_sums(where.column, where.row, self.sensor.diameter)
-        red, green, blue = self._add_noise(where, tick).sum(axis=0, dtype=np.int64).tolist()
+            return self._camera.measure_sums(footprint.column, footprint.row, self.sensor.diameter)
+        red, green, blue = self._add_noise(footprint, tick).sum(axis=0, dtype=np.int64).tolist()
         return red, green, blue
 
-    def render_image(self, where: Footprint, tick: int) -> bytes:
+    def render_image(self, footprint: Footprint, tick: int) -> bytes:
         """Return RGBA bytes, row-major, top row first. Outside the round window, pixels have the original's colour."""
         side = self.sensor.diameter
         rgba = np.empty((side, side, 4), np.uint8)
         rgba[:, :, :3] = _OUTSIDE
         rgba[:, :, 3] = 255
         if self._noise <= 0:
-            seen = self._camera.render_window(where.column, where.row, side)[self._mask]
+            colours = self._camera.render_window(footprint.column, footprint.row, side)[self._mask]
         else:
-            seen = self._add_noise(where, tick)
-        rgba[self._mask, :3] = seen
+            colours = self._add_noise(footprint, tick)
+        rgba[self._mask, :3] = colours
         return rgba.tobytes()
 
-    def _add_noise(self, where: Footprint, tick: int) -> NDArray[np.uint8]:
+    def _add_noise(self, footprint: Footprint, tick: int) -> NDArray[np.uint8]:
         """Return the visible pixels with uniform noise, rounded half up and clamped, shape (pixels, 3)."""
-        seen = self._camera.render_window(where.column, where.row, self.sensor.diameter)[self._mask]
+        colours = self._camera.render_window(footprint.column, footprint.row, self.sensor.diameter)[self._mask]
         offsets = self._chance.uniforms(tick, self.pixels * 3).reshape(-1, 3) * (2 * self._noise) - self._noise
-        return np.clip(np.floor(seen + offsets + 0.5), 0, 255).astype(np.uint8)
+        return np.clip(np.floor(colours + offsets + 0.5), 0, 255).astype(np.uint8)

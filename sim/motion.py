@@ -68,8 +68,8 @@ class FreeMotion:
         if left == 0.0 and right == 0.0:
             return x, y, 0.0
         sine, cosine = sincos(heading)
-        middle = (left + right) / 2
-        return x + middle * cosine, y + middle * sine, (right - left) / self._spacing
+        distance = (left + right) / 2
+        return x + distance * cosine, y + distance * sine, (right - left) / self._spacing
 
 
 class SolidMotion:
@@ -119,13 +119,13 @@ class SolidMotion:
 
     def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y in mm and the turn in radians. Bullet is used only near walls and obstacles."""
-        new_x, new_y, turned = self._free.compute_move(x, y, heading, left, right)
-        far = self._reach + math.hypot(new_x - x, new_y - y)
+        new_x, new_y, rotation = self._free.compute_move(x, y, heading, left, right)
+        contact_distance = self._reach + math.hypot(new_x - x, new_y - y)
         partner = self._partner
-        if all(measure_gap(box, x, y) > far for box in self._boxes) and (
-            partner is None or partner.measure_gap(x, y) > far
+        if all(measure_gap(box, x, y) > contact_distance for box in self._boxes) and (
+            partner is None or partner.measure_gap(x, y) > contact_distance
         ):
-            return new_x, new_y, turned
+            return new_x, new_y, rotation
         client = self._client.id
         pb.restoreState(self._state, physicsClientId=client)
         if partner is not None:
@@ -134,15 +134,17 @@ class SolidMotion:
         pb.resetBaseVelocity(
             self._body,
             ((new_x - x) * _METRE / _TICK, (new_y - y) * _METRE / _TICK, 0),
-            (0, 0, turned / _TICK),
+            (0, 0, rotation / _TICK),
             physicsClientId=client,
         )
         pb.stepSimulation(physicsClientId=client)
-        (met_x, met_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
-        met_x, met_y, met_turn = met_x / _METRE, met_y / _METRE, compute_turn(heading, turn)
+        (bullet_x, bullet_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
+        bullet_x, bullet_y, bullet_turn = bullet_x / _METRE, bullet_y / _METRE, compute_turn(heading, turn)
         # A contact may begin and end within the tick. Therefore the result is compared, not the remaining contacts.
-        free = math.hypot(met_x - new_x, met_y - new_y) < _UNTOUCHED and abs(met_turn - turned) < _UNTOUCHED
-        return (new_x, new_y, turned) if free else (round(met_x, 6), round(met_y, 6), round(met_turn, 9))
+        is_free = (
+            math.hypot(bullet_x - new_x, bullet_y - new_y) < _UNTOUCHED and abs(bullet_turn - rotation) < _UNTOUCHED
+        )
+        return (new_x, new_y, rotation) if is_free else (round(bullet_x, 6), round(bullet_y, 6), round(bullet_turn, 9))
 
 
 @dataclass(slots=True)

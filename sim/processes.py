@@ -37,15 +37,15 @@ def build_python_command(*arguments: str) -> list[str]:
     return [sys.executable, "-P", "-s", *arguments]
 
 
-def build_clean_environment(extra: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment without variables that redirect Python or libraries, plus the variables in ``extra``."""
-    kept = {
+def build_clean_environment(extra_variables: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment without variables that redirect Python or libraries, plus ``extra_variables``."""
+    variables = {
         name: value
         for name, value in os.environ.items()
         if not name.startswith("PYTHON") and name not in _REMOVED_VARIABLES
     }
     # For child processes of the started process, such as the pool children of a worker.
-    return kept | {"PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"} | dict(extra)
+    return variables | {"PYTHONSAFEPATH": "1", "PYTHONNOUSERSITE": "1"} | dict(extra_variables)
 
 
 @functools.cache
@@ -77,7 +77,7 @@ def leave_current_folder() -> None:
 
     Libraries look for modules and settings in the working folder, regardless of the import path.
     """
-    not_ours = {str(Path.cwd())} - {_OUR_PACKAGES}
-    sys.path[:] = [folder for folder in sys.path if folder.startswith("/") and folder not in not_ours]
+    foreign_paths = {str(Path.cwd())} - {_OUR_PACKAGES}
+    sys.path[:] = [folder for folder in sys.path if folder.startswith("/") and folder not in foreign_paths]
     os.chdir(SAFE_FOLDER)
     os.environ.update(PYTHONSAFEPATH="1", PYTHONNOUSERSITE="1")

@@ -112,9 +112,9 @@ class Ticks:
     length: int = TICK  # of a tick, in units of simulated time
 
     def __post_init__(self) -> None:
-        for each in COLUMNS:
-            if getattr(self, each.name) is None:
-                object.__setattr__(self, each.name, each.build_unknown_values(len(self.x)))
+        for column_info in COLUMNS:
+            if getattr(self, column_info.name) is None:
+                object.__setattr__(self, column_info.name, column_info.build_unknown_values(len(self.x)))
 
     def __len__(self) -> int:
         return len(self.x)
@@ -305,10 +305,10 @@ class Fault:
     @property
     def place(self) -> str:
         """``line 3``, ``cell 7, line 3``, ``parser, line 3`` or ``line 3 of helper.py``; empty if unknown."""
-        within = [self.agent] if self.agent else []
-        within += [f"cell {self.cell}"] if self.cell is not None else []
-        beside = f" of {self.file}" if self.file else ""
-        return ", ".join(within + ([f"line {self.line}{beside}"] if self.line is not None else []))
+        parts = [self.agent] if self.agent else []
+        parts += [f"cell {self.cell}"] if self.cell is not None else []
+        file_suffix = f" of {self.file}" if self.file else ""
+        return ", ".join(parts + ([f"line {self.line}{file_suffix}"] if self.line is not None else []))
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,23 +34,23 @@ def is_stationary(recording: Recording) -> bool:
     """Return whether no robot moved or turned in any tick; True without ticks."""
     ticks, start = recording.ticks, recording.start
     # The conversion to radians and back loses the last bits.
-    still = all(
+    is_still = all(
         bool((abs(column - first) < 1e-9).all())
         for column, first in ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
     )
-    return still and (recording.partner is None or is_stationary(recording.partner))
+    return is_still and (recording.partner is None or is_stationary(recording.partner))
 
 
 def collect_printed_lines(recording: Recording) -> list[TimedText]:
     """Return the printed lines of one robot without those that ``say`` added."""
-    said = Counter((line.t, line.text) for line in recording.spoken)
-    alone = []
+    spoken_counts = Counter((line.t, line.text) for line in recording.spoken)
+    printed_only = []
     for line in recording.printed:
-        if said[line.t, line.text]:
-            said[line.t, line.text] -= 1
+        if spoken_counts[line.t, line.text]:
+            spoken_counts[line.t, line.text] -= 1
         else:
-            alone.append(line)
-    return alone
+            printed_only.append(line)
+    return printed_only
 
 
 def has_no_responder(recording: Recording) -> bool:
@@ -89,10 +89,10 @@ def count_ticks_until(recording: Recording, t: float) -> int:
 def get_pose_after(recording: Recording, tick: int) -> Pose:
     """Return the pose after this number of ticks: the start pose before the first, the final pose after the last."""
     ticks = recording.ticks
-    done = min(tick, len(ticks))
-    if done < 1:
+    count = min(tick, len(ticks))
+    if count < 1:
         return recording.start
-    return Pose(float(ticks.x[done - 1]), float(ticks.y[done - 1]), float(ticks.heading[done - 1]))
+    return Pose(float(ticks.x[count - 1]), float(ticks.y[count - 1]), float(ticks.heading[count - 1]))
 
 
 def get_pose_at(recording: Recording, t: float) -> Pose:

@@ -84,11 +84,11 @@ class RigidWheels:
         )
         for _ in range(_STEPS):
             pb.stepSimulation(physicsClientId=client)
-        (met_x, met_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
-        turned = round(compute_turn(heading, turn), 9)
-        sine, cosine = sincos(heading + turned)
-        met_x, met_y = met_x / _METRE - self._mass_ahead * cosine, met_y / _METRE - self._mass_ahead * sine
-        return round(met_x, 6), round(met_y, 6), turned
+        (bullet_x, bullet_y, _), turn = pb.getBasePositionAndOrientation(self._body, physicsClientId=client)
+        rotation = round(compute_turn(heading, turn), 9)
+        sine, cosine = sincos(heading + rotation)
+        bullet_x, bullet_y = bullet_x / _METRE - self._mass_ahead * cosine, bullet_y / _METRE - self._mass_ahead * sine
+        return round(bullet_x, 6), round(bullet_y, 6), rotation
 
     def _build(self, robot: Robot) -> int:
         client = self._client.id
@@ -105,8 +105,8 @@ class RigidWheels:
         wheel = pb.createCollisionShape(pb.GEOM_SPHERE, radius=radius, physicsClientId=client)
         ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=caster_radius, physicsClientId=client)
         # The joint turns about the link's z axis; the link is rotated so that a positive speed rolls forwards.
-        rolled = pb.getQuaternionFromEuler([math.pi / 2, 0, 0])
-        upright = (0, 0, 0, 1)
+        axle_orientation = pb.getQuaternionFromEuler([math.pi / 2, 0, 0])
+        upright_orientation = (0, 0, 0, 1)
         caster_at = robot.back * 0.75 * _METRE
         body: int = pb.createMultiBody(
             baseMass=_BODY_KG,
@@ -117,9 +117,9 @@ class RigidWheels:
             linkCollisionShapeIndices=[wheel, wheel, ball],
             linkVisualShapeIndices=[-1, -1, -1],
             linkPositions=[[0, half_spacing, 0], [0, -half_spacing, 0], [caster_at, 0, caster_radius - radius]],
-            linkOrientations=[rolled, rolled, upright],
+            linkOrientations=[axle_orientation, axle_orientation, upright_orientation],
             linkInertialFramePositions=[[0, 0, 0]] * 3,
-            linkInertialFrameOrientations=[upright] * 3,
+            linkInertialFrameOrientations=[upright_orientation] * 3,
             linkParentIndices=[0, 0, 0],
             linkJointTypes=[pb.JOINT_REVOLUTE, pb.JOINT_REVOLUTE, pb.JOINT_FIXED],
             linkJointAxis=[[0, 0, -1], [0, 0, -1], [0, 0, 1]],

@@ -22,5 +22,5 @@ class Sentence:
 
 def join_with_and(parts: Sequence[str | Sentence]) -> str | Sentence:
     """Join the parts with "and"; empty for no parts."""
-    *before, last = parts or ("",)
-    return Sentence("%(these)s and %(last)s", {"these": join_with_and(before), "last": last}) if before else last
+    *head, last = parts or ("",)
+    return Sentence("%(these)s and %(last)s", {"these": join_with_and(head), "last": last}) if head else last

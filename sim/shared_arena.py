@@ -38,12 +38,12 @@ class SharedArena(Arena):
 
     def find_contacts(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """Return the objects touched as in an arena, and the partner's name if the bodies touch."""
-        touched = super().find_contacts(robot, x, y, heading)
+        touched_names = super().find_contacts(robot, x, y, heading)
         if self._partner.measure_gap(x, y) > robot.reach + TOUCH:
-            return touched
+            return touched_names
         body = self._body(robot)
         place_body(body, x, y, heading, self._client)
-        return (*touched, self._name) if self._is_in_contact(body, self._partners_body) else touched
+        return (*touched_names, self._name) if self._is_in_contact(body, self._partners_body) else touched_names
 
     def _make_motion(self, robot: Robot, physics: Physics) -> Motion:
         if physics.drive == "wheels":

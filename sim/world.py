@@ -118,7 +118,7 @@ class World:
         # Contacts at the start pose do not count as touches: several of the course's poses overlap a wall.
         self._touching = arena.find_contacts(robot, pose.x, pose.y, self.drive.heading)
         self._rows: list[bytes] = []
-        self._read_sensors(moved=True, listen=True)
+        self._read_sensors(has_moved=True, is_listening=True)
 
     @property
     def pose(self) -> Pose:
@@ -137,9 +137,9 @@ class World:
         drive.tick(self.clock)
         return x != drive.x or y != drive.y or heading != drive.heading
 
-    def sense(self, moved: bool) -> None:
+    def sense(self, has_moved: bool) -> None:
         """Run the second half of a tick, after all robots have moved: read the sensors and write the row."""
-        self._read_sensors(moved, listen=self.clock % 3 == 0)
+        self._read_sensors(has_moved, is_listening=self.clock % 3 == 0)
         row = _ROW.pack(self.clock * self._tick, *_collect_row(self))
         self._rows.append(row)
         self._chain.add_bytes(row[:_CHAINED])
@@ -185,9 +185,9 @@ class World:
             length=self._tick,
         )
 
-    def _read_sensors(self, moved: bool, listen: bool) -> None:
+    def _read_sensors(self, has_moved: bool, is_listening: bool) -> None:
         drive = self.drive
-        if moved:
+        if has_moved:
             sine, cosine = sincos(drive.heading - _RIGHT_ANGLE)
             left, right = self.robot.left_light, self.robot.right_light
             self._footprints = (
@@ -195,18 +195,18 @@ class World:
                 compute_footprint(right, drive.x, drive.y, sine, cosine),
             )
             self._record_touches()
-        if moved or self._noisy:
+        if has_moved or self._noisy:
             self.left_sums = self._lights[0].measure_sums(self._footprints[0], self.clock)
             self.right_sums = self._lights[1].measure_sums(self._footprints[1], self.clock)
-        if listen:
+        if is_listening:
             self.ultrasonic = self._arena.measure_distance(drive.x, drive.y, drive.heading, self.robot.ultrasonic_y)
 
     def _record_touches(self) -> None:
-        touching = self._arena.find_contacts(self.robot, self.drive.x, self.drive.y, self.drive.heading)
-        for what in touching:
-            if what not in self._touching:
-                self.touches.append(Touch(self.clock * self._tick / SECOND, what, self.pose))
-        self._touching = touching
+        touched_names = self._arena.find_contacts(self.robot, self.drive.x, self.drive.y, self.drive.heading)
+        for name in touched_names:
+            if name not in self._touching:
+                self.touches.append(Touch(self.clock * self._tick / SECOND, name, self.pose))
+        self._touching = touched_names
 
 
 def _compute_means(sums: tuple[int, int, int], pixels: int) -> list[float]:

@@ -34,12 +34,12 @@ def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
     except UnreadableDataError as error:
         raise UsageError(f"{path.name}: cannot be unpacked: {error}.") from None
     except OSError as error:
-        free = shutil.disk_usage(folder).free
-        raise UsageError(f"{path.name}: cannot be unpacked: {error.strerror} ({free >> 20} MB free).") from None
+        free_bytes = shutil.disk_usage(folder).free
+        raise UsageError(f"{path.name}: cannot be unpacked: {error.strerror} ({free_bytes >> 20} MB free).") from None
 
 
 def _extract_into(archive: ZipFile, folder: Path, name: str, most_entries: int, most_bytes: int) -> None:
-    left = most_bytes
+    remaining_bytes = most_bytes
     infos = [info for info in archive.infolist() if not info.is_dir()]
     if len(infos) > most_entries:
         raise UsageError(f"{name}: holds {len(infos)} files, expected at most {most_entries}.")
@@ -48,8 +48,8 @@ def _extract_into(archive: ZipFile, folder: Path, name: str, most_entries: int, 
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("xb") as sink:
             for chunk in read_entry_chunks(archive, info):
-                left -= len(chunk)
-                if left < 0:
+                remaining_bytes -= len(chunk)
+                if remaining_bytes < 0:
                     raise UsageError(f"{name}: unpacks to more than {_format_amount(most_bytes)}.")
                 sink.write(chunk)
 

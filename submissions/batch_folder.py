@@ -67,7 +67,7 @@ def read_batch(path: Path, assignment: str | None, people: People | None = None)
     return read_batch_for(path, None if assignment is None else find_assignment(assignment), people)
 
 
-def read_batch_for(path: Path, asked: Assignment | None, people: People | None = None) -> BatchContents:
+def read_batch_for(path: Path, assignment: Assignment | None, people: People | None = None) -> BatchContents:
     """Read every submission as ``read_batch`` does, for an assignment that is already loaded.
 
     Raises:
@@ -80,8 +80,8 @@ def read_batch_for(path: Path, asked: Assignment | None, people: People | None =
                 sanitise_name(f"line {row.line}: {row.student.id}" if row.student.id else f"line {row.line}"),
                 row.student,
                 people if row.student.id else None,
-                row.assignment or (asked.id if asked else ""),
-                partial(_build_roster_request, path.parent, row, asked, find),
+                row.assignment or (assignment.id if assignment else ""),
+                partial(_build_roster_request, path.parent, row, assignment, find),
                 row.problem,
             )
             for row in read_roster(path)
@@ -93,119 +93,134 @@ def read_batch_for(path: Path, asked: Assignment | None, people: People | None =
                 found.source,
                 found.student,
                 people,
-                asked.id if asked else "",
-                partial(_build_request, found, folder.name, asked, find_own),
+                assignment.id if assignment else "",
+                partial(_build_request, found, folder.name, assignment, find_own),
                 found.problem,
                 found.number,
             )
-            for found in _list_submissions(folder, asked)
+            for found in _list_submissions(folder, assignment)
         )
 
 
 def _build_row(
     name: str,
-    written: Student,
+    stated_student: Student,
     people: People | None,
     assignment: str,
-    read: Callable[[Student], GradingRequest],
+    read_request: Callable[[Student], GradingRequest],
     problem: str,
     number: str = "",
 ) -> _BatchRow:
-    student = written
+    student = stated_student
     try:
-        student = people.find(written, number) if people is not None else written
+        student = people.find(stated_student, number) if people is not None else stated_student
     except UsageError as error:
         problem = problem or str(error)
-    return _BatchRow(name, student, assignment, partial(read, student), problem)
+    return _BatchRow(name, student, assignment, partial(read_request, student), problem)
 
 
 def _read_rows(rows: Iterable[_BatchRow]) -> BatchContents:
     rows = list(rows)
-    near = find_look_alikes(row.student.id for row in rows if row.student.id)
-    found: list[GradingRequest | str] = []
+    look_alikes = find_look_alikes(row.student.id for row in rows if row.student.id)
+    outcomes: list[GradingRequest | str] = []
     for row in rows:
         try:
             if row.problem:
                 raise UsageError(row.problem)
-            if row.student.id in near:
+            if row.student.id in look_alikes:
                 raise UsageError(
-                    f"{describe_look_alikes(near[row.student.id])}; expected names that are clearly different."
+                    f"{describe_look_alikes(look_alikes[row.student.id])}; expected names that are clearly different."
                 )
-            found.append(row.read())
+            outcomes.append(row.read())
         except UsageError as error:
-            found.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
+            outcomes.append(" ".join(str(error).split()).removeprefix(f"{row.name}: "))
         except Exception:
             # An internal error with one submission must not reject a whole class.
             _log.exception("%s could not be read", row.name)
-            found.append("cannot be read because of a fault in Robomark; its log has the details. Report this fault.")
-    found = _reject_duplicates(rows, found)
+            outcomes.append(
+                "cannot be read because of a fault in Robomark; its log has the details. Report this fault."
+            )
+    outcomes = _reject_duplicates(rows, outcomes)
     return BatchContents(
-        tuple(each for each in found if isinstance(each, GradingRequest)),
+        tuple(each for each in outcomes if isinstance(each, GradingRequest)),
         tuple(
             RejectedSubmission(row.name, each, row.student, row.assignment)
-            for row, each in zip(rows, found, strict=True)
+            for row, each in zip(rows, outcomes, strict=True)
             if isinstance(each, str)
         ),
     )
 
 
-def _reject_duplicates(rows: Sequence[_BatchRow], found: Sequence[GradingRequest | str]) -> list[GradingRequest | str]:
+def _reject_duplicates(
+    rows: Sequence[_BatchRow], outcomes: Sequence[GradingRequest | str]
+) -> list[GradingRequest | str]:
     """Keep one submission per student and assignment. If several differ, reject all of them."""
-    places: dict[tuple[str, str], dict[int, GradingRequest]] = {}
-    for place, each in enumerate(found):
-        if isinstance(each, GradingRequest):
-            places.setdefault((each.submission.student, each.assignment.id), {})[place] = each
-    left = list(found)
-    for (_, assignment), same in places.items():
-        first, *others = same
-        if len({each.submission.sha256 for each in same.values()}) == 1:
+    groups: dict[tuple[str, str], dict[int, GradingRequest]] = {}
+    for index, outcome in enumerate(outcomes):
+        if isinstance(outcome, GradingRequest):
+            groups.setdefault((outcome.submission.student, outcome.assignment.id), {})[index] = outcome
+    remaining = list(outcomes)
+    for (_, assignment), duplicates in groups.items():
+        first_index, *other_indexes = duplicates
+        if len({each.submission.sha256 for each in duplicates.values()}) == 1:
             sentence = (
-                f"{rows[first].name} is already this student's submission for {assignment}; this one is left out."
+                f"{rows[first_index].name} is already this student's submission for {assignment}; this one is left out."
             )
-            for place in others:
-                left[place] = sentence
+            for index in other_indexes:
+                remaining[index] = sentence
             continue
-        for place, other in ((first, others[0]), *((other, first) for other in others)):
-            left[place] = (
-                f"{rows[other].name} is this student's submission for {assignment}, too, "
+        for index, other_index in ((first_index, other_indexes[0]), *((other, first_index) for other in other_indexes)):
+            remaining[index] = (
+                f"{rows[other_index].name} is this student's submission for {assignment}, too, "
                 "and not the same; expected one."
             )
-    return left
+    return remaining
 
 
 def _build_request(
-    found: DownloadedFiles, folder: str, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
+    download: DownloadedFiles,
+    folder: str,
+    requested_assignment: Assignment | None,
+    find: Callable[[str], Assignment],
+    student: Student,
 ) -> GradingRequest:
     length = len(normalise_name(student.id))
     if not 0 < length <= LONGEST_NAME:
         raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
-    submission, own = _read_student_submission(found, folder, asked, student), asked
-    if own is None:
+    submission, assignment = (
+        _read_student_submission(download, folder, requested_assignment, student),
+        requested_assignment,
+    )
+    if assignment is None:
         if submission.assignment is None:
             raise UsageError("has no assignment; name it with -a or in its submission.toml.")
-        own = find(submission.assignment)
-        submission = fit_parts(submission, own.parts)
-    return GradingRequest(submission, own, found.source, found.submitted_at, student)
+        assignment = find(submission.assignment)
+        submission = fit_parts(submission, assignment.parts)
+    return GradingRequest(submission, assignment, download.source, download.submitted_at, student)
 
 
 def _read_student_submission(
-    found: DownloadedFiles, folder: str, asked: Assignment | None, student: Student
+    download: DownloadedFiles, folder: str, requested_assignment: Assignment | None, student: Student
 ) -> Submission:
-    parts = None if asked is None else asked.parts
-    if isinstance(found.files, Path):
-        return read_submission(found.files, student=student.id, asked=parts)
-    raw = read_paths(found.files, found.source)
-    return build_submission(raw, found.source, student.id, found.assignment or folder, parts)
+    parts = None if requested_assignment is None else requested_assignment.parts
+    if isinstance(download.files, Path):
+        return read_submission(download.files, student=student.id, required_parts=parts)
+    raw = read_paths(download.files, download.source)
+    return build_submission(raw, download.source, student.id, download.assignment or folder, parts)
 
 
 def _build_roster_request(
-    folder: Path, row: RosterRow, asked: Assignment | None, find: Callable[[str], Assignment], student: Student
+    folder: Path,
+    row: RosterRow,
+    requested_assignment: Assignment | None,
+    find: Callable[[str], Assignment],
+    student: Student,
 ) -> GradingRequest:
-    if not row.assignment and asked is None:
+    if not row.assignment and requested_assignment is None:
         raise UsageError("has no assignment; name it with -a or in a column assignment.")
     path = resolve_file(folder, row.file)
-    assignment = find(row.assignment) if row.assignment or asked is None else asked
-    submission = read_submission(path, student=student.id, asked=assignment.parts)
+    assignment = find(row.assignment) if row.assignment or requested_assignment is None else requested_assignment
+    submission = read_submission(path, student=student.id, required_parts=assignment.parts)
     return GradingRequest(submission, assignment, sanitise_name(row.file), row.submitted_at, student)
 
 
@@ -217,27 +232,28 @@ def _find_roster_assignment(folder: Path, name: str) -> Assignment:
     return read_assignment(path) if path.is_dir() else find_assignment(name)
 
 
-def _list_submissions(folder: Path, asked: Assignment | None) -> list[DownloadedFiles]:
+def _list_submissions(folder: Path, requested_assignment: Assignment | None) -> list[DownloadedFiles]:
     """Return the submissions in a folder. If a platform exported several assignments, select the requested one."""
-    found = list_student_files(folder)
+    downloads = list_student_files(folder)
     parts = [entry.name for entry in folder.iterdir() if entry.name.lower() in _PARTS]
     if parts:
         raise UsageError(
             f"{folder.name}: has {min(parts)} in it, so it looks like one submission; a batch is a folder with a "
             "subfolder, .py or .zip for each student (one submission is graded with robomark grade)."
         )
-    if not found:
+    if not downloads:
         raise UsageError(f"{folder.name}: is empty, expected a subfolder, .py or .zip for each student.")
-    several = dict.fromkeys(each.assignment for each in found)
-    if asked is None or len(several) == 1:
-        return found
-    if asked.id not in several:
+    assignment_ids = dict.fromkeys(each.assignment for each in downloads)
+    if requested_assignment is None or len(assignment_ids) == 1:
+        return downloads
+    if requested_assignment.id not in assignment_ids:
         raise UsageError(
-            f"{folder.name}: has submissions for {', '.join(map(sanitise_name, list(several)[:5]))}, expected for "
-            f"{asked.id}, "
+            f"{folder.name}: has submissions for {', '.join(map(sanitise_name, list(assignment_ids)[:5]))}, "
+            "expected for "
+            f"{requested_assignment.id}, "
             "or for one assignment alone."
         )
-    return [each for each in found if each.assignment == asked.id]
+    return [each for each in downloads if each.assignment == requested_assignment.id]
 
 
 @contextmanager
@@ -261,8 +277,8 @@ def _opened(path: Path) -> Iterator[Path]:
 
 def _enter_only_folder(folder: Path) -> Path:
     """Return the only subfolder, if an archive has one around all submissions. A single student's folder is kept."""
-    inside = [entry for entry in folder.iterdir() if entry.name not in IGNORED]
-    if len(inside) != 1 or not inside[0].is_dir():
+    entries = [entry for entry in folder.iterdir() if entry.name not in IGNORED]
+    if len(entries) != 1 or not entries[0].is_dir():
         return folder
-    files = {entry.name.lower() for entry in inside[0].iterdir()}
-    return folder if files & _PARTS or is_student_folder(inside[0]) else inside[0]
+    files = {entry.name.lower() for entry in entries[0].iterdir()}
+    return folder if files & _PARTS or is_student_folder(entries[0]) else entries[0]

@@ -54,23 +54,25 @@ _WRITEFILE = re.compile(r"\s*%%(?:writefile|file)[ \t]+(?P<name>[A-Za-z0-9_.]+)[
 UNNAMED = "unnamed"
 
 
-def read_submission(path: Path, *, student: str | None = None, asked: Parts | None = None) -> Submission:
+def read_submission(path: Path, *, student: str | None = None, required_parts: Parts | None = None) -> Submission:
     """Read the submission at ``path``: a .py file, an .ipynb notebook, a folder or a .zip.
 
     ``student`` identifies the student; the default is the name of the file or folder. A name in the submission's own
-    submission.toml is noted. With ``asked``, a single .py file becomes the part that the assignment asks for, and a
-    submission without such a part is rejected. Without ``asked``, the name or the text of a single .py file decides its
-    part.
+    submission.toml is noted. With ``required_parts``, a single .py file becomes the part that the assignment asks for,
+    and a submission without such a part is rejected. Without ``required_parts``, the name or the text of a single .py
+    file decides its part.
 
     Raises:
         UsageError: The path cannot be read as a submission.
     """
     path = Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow a link
-    where = sanitise_name(path.name)
+    source_name = sanitise_name(path.name)
     if path.is_symlink():
-        raise UsageError("%(where)s: is a link, expected the file or folder itself.", where=where)
+        raise UsageError("%(where)s: is a link, expected the file or folder itself.", where=source_name)
     if not path.exists():
-        raise UsageError("%(where)s: does not exist, expected a .py file, a notebook, a folder or a .zip.", where=where)
+        raise UsageError(
+            "%(where)s: does not exist, expected a .py file, a notebook, a folder or a .zip.", where=source_name
+        )
     suffix = path.suffix.lower()
     if path.is_dir():
         raw = read_folder(path)
@@ -84,19 +86,21 @@ def read_submission(path: Path, *, student: str | None = None, asked: Parts | No
             raise UsageError(Sentence("%(advice)s.", {"advice": advice}))
         raise UsageError(
             "%(where)s: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip.",
-            where=where,
+            where=source_name,
         )
-    return build_submission(raw, where, student or derive_student_name(path), path.parent.name, asked)
+    return build_submission(raw, source_name, student or derive_student_name(path), path.parent.name, required_parts)
 
 
-def build_submission(raw: RawFiles, where: str, student: str, candidate: str, asked: Parts | None = None) -> Submission:
+def build_submission(
+    raw: RawFiles, source_name: str, student: str, candidate: str, required_parts: Parts | None = None
+) -> Submission:
     """Return the submission in these files, for the assignment ``candidate`` unless the files name another.
 
     Raises:
-        UsageError: As for ``read_submission``; ``where`` names the files in the message.
+        UsageError: As for ``read_submission``; ``source_name`` names the files in the message.
     """
-    submission = _assemble_submission(raw, where, student, candidate)
-    return submission if asked is None else fit_parts(submission, asked, where=where)
+    submission = _assemble_submission(raw, source_name, student, candidate)
+    return submission if required_parts is None else fit_parts(submission, required_parts, source_name=source_name)
 
 
 def derive_student_name(path: Path) -> str:
@@ -107,7 +111,7 @@ def derive_student_name(path: Path) -> str:
     return path.name if path.is_dir() else path.stem
 
 
-def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None) -> Submission:
+def fit_parts(submission: Submission, required_parts: Parts, *, source_name: str | None = None) -> Submission:
     """Adapt the submission to an assignment with these parts.
 
     A single file with another name than robot.py or responder.py becomes the one part that is asked for. Parts that the
@@ -116,44 +120,44 @@ def fit_parts(submission: Submission, asked: Parts, *, where: str | None = None)
     Raises:
         UsageError: None of the parts is present.
     """
-    where = where or submission.student
+    source_name = source_name or submission.student
     if submission.notebook is not None:
-        return _fit_notebook(submission, submission.notebook, asked, where)
-    submission = _add_agents(submission, asked, where)
+        return _fit_notebook(submission, submission.notebook, required_parts, source_name)
+    submission = _add_agents(submission, required_parts, source_name)
     notes = list(submission.notes)
     parts: dict[Part, SourceFile | None] = {"program": submission.program, "responder": submission.responder}
-    givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
-    wanted = [part for part, who in givers.items() if who == "student"]
-    submitted = [part for part, source in parts.items() if source is not None]
-    if len(wanted) == 1 and len(submitted) == 1 and wanted != submitted:
-        lone = parts[submitted[0]]
-        if lone is not None and lone.name.lower() not in _NAMES:
-            parts = {submitted[0]: None, wanted[0]: lone}
-            notes = [note for note in notes if note != build_part_use_note(lone.name, submitted[0])]
-            notes.append(build_part_use_note(lone.name, wanted[0]))
-    missing = [part for part in wanted if parts.get(part) is None]
-    files = [PART_FILES[part] for part in missing]
-    needed = [_describe_file(PART_FILES[part], PART_WORDS[part]) for part in wanted]
-    if asked.second_program == "student":
-        needed.append(_describe_file(SECOND_PROGRAM, Sentence("the second robot's program")))
+    givers: dict[Part, str] = {"program": required_parts.program, "responder": required_parts.responder}
+    student_parts = [part for part, who in givers.items() if who == "student"]
+    submitted_parts = [part for part, source in parts.items() if source is not None]
+    if len(student_parts) == 1 and len(submitted_parts) == 1 and student_parts != submitted_parts:
+        only_source = parts[submitted_parts[0]]
+        if only_source is not None and only_source.name.lower() not in _NAMES:
+            parts = {submitted_parts[0]: None, student_parts[0]: only_source}
+            notes = [note for note in notes if note != build_part_use_note(only_source.name, submitted_parts[0])]
+            notes.append(build_part_use_note(only_source.name, student_parts[0]))
+    missing_parts = [part for part in student_parts if parts.get(part) is None]
+    files = [PART_FILES[part] for part in missing_parts]
+    needed_files = [_describe_file(PART_FILES[part], PART_WORDS[part]) for part in student_parts]
+    if required_parts.second_program == "student":
+        needed_files.append(_describe_file(SECOND_PROGRAM, Sentence("the second robot's program")))
         files += [SECOND_PROGRAM] if SECOND_PROGRAM not in submission.files else []
     # With two robots, both programs are needed.
-    if files and (len(missing) == len(wanted) or asked.second_program != "none"):
+    if files and (len(missing_parts) == len(student_parts) or required_parts.second_program != "none"):
         raise UsageError(
             "%(where)s: has no %(names)s, expected %(expected)s%(renamed)s.",
-            where=where,
+            where=source_name,
             names=join_with_and(files),
-            expected=join_with_and(needed),
-            renamed=advise_on_names(missing, submission.files),
+            expected=join_with_and(needed_files),
+            renamed=advise_on_names(missing_parts, submission.files),
         )
-    notes += [build_missing_part_note(part, submission.files) for part in missing]
+    notes += [build_missing_part_note(part, submission.files) for part in missing_parts]
     for part, source in parts.items():
-        if source is not None and part not in wanted:
+        if source is not None and part not in student_parts:
             notes.append(f"{sanitise_name(source.name)} was left out: the assignment does not need {PART_WORDS[part]}.")
             parts[part] = None
-    fitted = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
-    notes += [f"{name} is empty." for name in find_empty_parts(fitted)]
-    return dataclasses.replace(fitted, notes=tuple(notes))
+    fitted_submission = dataclasses.replace(submission, program=parts.get("program"), responder=parts.get("responder"))
+    notes += [f"{name} is empty." for name in find_empty_parts(fitted_submission)]
+    return dataclasses.replace(fitted_submission, notes=tuple(notes))
 
 
 def find_empty_parts(submission: Submission) -> Iterator[str]:
@@ -163,9 +167,9 @@ def find_empty_parts(submission: Submission) -> Iterator[str]:
             yield sanitise_name(code.name)
 
 
-def find_missing_part(submission: Submission, asked: Parts) -> Part | None:
+def find_missing_part(submission: Submission, required_parts: Parts) -> Part | None:
     """Return the missing part if one of two was submitted; None if both or neither were."""
-    if (asked.program, asked.responder) == ("student", "student"):
+    if (required_parts.program, required_parts.responder) == ("student", "student"):
         if submission.program is None and submission.responder is not None:
             return "program"
         if submission.responder is None and submission.program is not None:
@@ -173,34 +177,34 @@ def find_missing_part(submission: Submission, asked: Parts) -> Part | None:
     return None
 
 
-def _fit_notebook(submission: Submission, notebook: Notebook, asked: Parts, where: str) -> Submission:
+def _fit_notebook(submission: Submission, notebook: Notebook, required_parts: Parts, source_name: str) -> Submission:
     """Keep the notebook if it is needed, otherwise the files beside it."""
     parts: dict[Part, SourceFile | None] = {"program": submission.program, "responder": submission.responder}
-    givers: dict[Part, str] = {"program": asked.program, "responder": asked.responder}
+    givers: dict[Part, str] = {"program": required_parts.program, "responder": required_parts.responder}
     if all(parts[part] is not None for part, who in givers.items() if who == "student"):
         note = f"{sanitise_name(notebook.name)} was left out: the assignment needs the other files."
-        alone = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
-        return fit_parts(alone, asked, where=where)
-    if asked.program == "student":
-        find_run(notebook, asked.cell, submission.run)
+        notebook_submission = dataclasses.replace(submission, notebook=None, notes=(*submission.notes, note))
+        return fit_parts(notebook_submission, required_parts, source_name=source_name)
+    if required_parts.program == "student":
+        find_run(notebook, required_parts.cell, submission.run)
     files, notes = dict(submission.files), list(submission.notes)
     for source in (submission.program, submission.responder):
         if source is not None:
             files[source.name] = source.text.encode("utf-8", "surrogatepass")
             notes.append(f"{sanitise_name(source.name)} is not used: the notebook is run instead.")
-    if asked.program != "student" and find_runs(notebook):
+    if required_parts.program != "student" and find_runs(notebook):
         notes.append(f"{sanitise_name(notebook.name)}: the assignment provides the robot program.")
-    alone = dataclasses.replace(
+    notebook_submission = dataclasses.replace(
         submission,
         program=None,
         responder=None,
         files=MappingProxyType(dict(sorted(files.items()))),
         notes=tuple(notes),
     )
-    return _add_agents(alone, asked, where)
+    return _add_agents(notebook_submission, required_parts, source_name)
 
 
-def _add_agents(submission: Submission, asked: Parts, where: str) -> Submission:
+def _add_agents(submission: Submission, required_parts: Parts, source_name: str) -> Submission:
     """Return the submission with each agent among its files, including agents first read as another part.
 
     A notebook can contain an agent in a cell that begins with ``%%writefile``.
@@ -208,39 +212,43 @@ def _add_agents(submission: Submission, asked: Parts, where: str) -> Submission:
     Raises:
         UsageError: An agent is missing.
     """
-    if not asked.agents:
+    if not required_parts.agents:
         return submission
     program, responder = submission.program, submission.responder
     files, notes = dict(submission.files), list(submission.notes)
     parts: dict[Part, SourceFile | None] = {"program": program, "responder": responder}
     for part, code in parts.items():
-        if code is not None and find_agent(code.name, asked.agents):
+        if code is not None and find_agent(code.name, required_parts.agents):
             files[code.name] = code.text.encode("utf-8", "surrogatepass")
             notes = [note for note in notes if note != build_part_use_note(code.name, part)]
             program = None if part == "program" else program
             responder = None if part == "responder" else responder
     for name in [
-        each for each in files if asked.agents.get(find_agent(each, asked.agents) or "", "student") != "student"
+        each
+        for each in files
+        if required_parts.agents.get(find_agent(each, required_parts.agents) or "", "student") != "student"
     ]:
         del files[name]
         notes.append(f"{sanitise_name(name)} was left out: the assignment provides this agent.")
     if submission.notebook is not None:
-        files = _collect_written_agents(submission.notebook, asked.agents) | files
-    there = {find_agent(name, asked.agents) for name in files}
-    missing = [f"{name}.py" for name, who in asked.agents.items() if who == "student" and name not in there]
-    if missing and submission.notebook is not None:
+        files = _collect_written_agents(submission.notebook, required_parts.agents) | files
+    present_agents = {find_agent(name, required_parts.agents) for name in files}
+    missing_files = [
+        f"{name}.py" for name, who in required_parts.agents.items() if who == "student" and name not in present_agents
+    ]
+    if missing_files and submission.notebook is not None:
         raise UsageError(
             "%(where)s: has no %(missing)s; put each agent in a file beside the notebook, or in a cell that begins "
             "with %%%%writefile %(first)s.",
-            where=where,
-            missing=join_with_and(missing),
-            first=missing[0],
+            where=source_name,
+            missing=join_with_and(missing_files),
+            first=missing_files[0],
         )
-    if missing:
+    if missing_files:
         raise UsageError(
             "%(where)s: has no %(missing)s, expected a file for each agent.",
-            where=where,
-            missing=join_with_and(missing),
+            where=source_name,
+            missing=join_with_and(missing_files),
         )
     return dataclasses.replace(
         submission,
@@ -253,46 +261,46 @@ def _add_agents(submission: Submission, asked: Parts, where: str) -> Submission:
 
 def _collect_written_agents(notebook: Notebook, agents: Mapping[str, str]) -> dict[str, bytes]:
     """Return the student's agents that cells of the notebook write to files."""
-    written = {}
+    agent_files = {}
     for cell in notebook.cells:
         match = _WRITEFILE.match(cell.source)
         if match is not None and agents.get(find_agent(match["name"], agents) or "") == "student":
-            written[match["name"]] = cell.source[match.end() :].encode("utf-8", "surrogatepass")
-    return written
+            agent_files[match["name"]] = cell.source[match.end() :].encode("utf-8", "surrogatepass")
+    return agent_files
 
 
-def _assemble_submission(raw: RawFiles, where: str, name: str, candidate: str) -> Submission:
+def _assemble_submission(raw: RawFiles, source_name: str, name: str, candidate: str) -> Submission:
     files = dict(raw.files)
     notes = list(raw.notes)
-    meta = read_meta(files.pop(META_FILE, b""), where)
-    left_out = [each for each, data in files.items() if is_compiled(each, data)]
-    for compiled in left_out:
-        del files[compiled]
-        notes.append(f"{sanitise_name(compiled)} was left out: it is compiled code; submit its Python source.")
-    if left_out and not files:
+    meta = read_meta(files.pop(META_FILE, b""), source_name)
+    compiled_files = [each for each, data in files.items() if is_compiled(each, data)]
+    for file in compiled_files:
+        del files[file]
+        notes.append(f"{sanitise_name(file)} was left out: it is compiled code; submit its Python source.")
+    if compiled_files and not files:
         raise UsageError(
             "%(where)s: has only %(names)s in it, which is not Python source, expected robot.py and responder.py.",
-            where=where,
-            names=join_with_and([sanitise_name(each) for each in left_out[:3]]),
+            where=source_name,
+            names=join_with_and([sanitise_name(each) for each in compiled_files[:3]]),
         )
     if not files:
-        raise UsageError("%(where)s: has no files in it, expected robot.py and responder.py.", where=where)
-    notebook = _find_notebook(files, where, notes)
-    parts = _find_parts(files, where, notes, alone=notebook is None)
+        raise UsageError("%(where)s: has no files in it, expected robot.py and responder.py.", where=source_name)
+    notebook = _find_notebook(files, source_name, notes)
+    parts = _find_parts(files, source_name, notes, has_no_notebook=notebook is None)
     sources: dict[Part, SourceFile] = {}
     for part, file_name in parts.items():
         decoded = decode_source(files.pop(file_name), sanitise_name(file_name))
         sources[part] = SourceFile(file_name, decoded.text)
         if decoded.note:
             notes.append(decoded.note)
-    assignment = get_meta_text(meta, "assignment", where)
+    assignment = get_meta_text(meta, "assignment", source_name)
     student = normalise_name(name)[:LONGEST_NAME].strip() or UNNAMED
-    named = normalise_name(get_meta_text(meta, "student", where) or student)
-    if named != student:
+    meta_student = normalise_name(get_meta_text(meta, "student", source_name) or student)
+    if meta_student != student:
         notes.append(
-            f"{META_FILE} names the student {sanitise_name(named)}, but the student is {sanitise_name(student)}."
+            f"{META_FILE} names the student {sanitise_name(meta_student)}, but the student is {sanitise_name(student)}."
         )
-    run = get_meta_run(meta, where)
+    run = get_meta_run(meta, source_name)
     if run is not None and notebook is None:
         notes.append(f"{META_FILE} says run = {normalise_name(run)}, which is not used: there is no notebook.")
     return Submission(
@@ -307,7 +315,7 @@ def _assemble_submission(raw: RawFiles, where: str, name: str, candidate: str) -
     )
 
 
-def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Notebook | None:
+def _find_notebook(files: dict[str, bytes], source_name: str, notes: list[str]) -> Notebook | None:
     """Remove the only notebook, or the only script made by nbconvert, from the files and return it."""
     names = sorted(name for name in files if name.lower().endswith(_NOTEBOOK))
     parts = {part for name in files if (part := _NAMES.get(name.lower()))}
@@ -318,21 +326,25 @@ def _find_notebook(files: dict[str, bytes], where: str, notes: list[str]) -> Not
         return None
     try:
         if len(names) > 1:
-            found = ", ".join(map(sanitise_name, names[:5]))
+            listed_names = ", ".join(map(sanitise_name, names[:5]))
             raise UsageError(
                 "%(where)s: has %(count)s notebooks in it (%(found)s), expected one.",
-                where=where,
+                where=source_name,
                 count=len(names),
-                found=found,
+                found=listed_names,
             )
         if names:
-            read = read_notebook(files[names[0]], sanitise_name(names[0]))
+            loaded = read_notebook(files[names[0]], sanitise_name(names[0]))
             del files[names[0]]
-            notes.extend(read.notes)
-            return read.notebook
+            notes.extend(loaded.notes)
+            return loaded.notebook
     except UsageError as error:
-        named = str(error).startswith(where)
-        sentence = error.message if named else Sentence("%(where)s: %(why)s", {"where": where, "why": error.message})
+        has_prefix = str(error).startswith(source_name)
+        sentence = (
+            error.message
+            if has_prefix
+            else Sentence("%(where)s: %(why)s", {"where": source_name, "why": error.message})
+        )
         if not parts:
             raise UsageError(sentence) from None
         # The .py file beside it may contain the requested parts.
@@ -351,8 +363,10 @@ def _is_script(data: bytes, name: str) -> bool:
     return b"get_ipython" in data and is_script(decode_source(data, sanitise_name(name)).text)
 
 
-def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alone: bool) -> dict[Part, str]:
-    """Assign files to parts by name; with ``alone``, also by the content of a single file or a pair."""
+def _find_parts(
+    files: Mapping[str, bytes], source_name: str, notes: list[str], *, has_no_notebook: bool
+) -> dict[Part, str]:
+    """Assign files to parts by name; with ``has_no_notebook``, also by the content of a single file or a pair."""
     parts: dict[Part, str] = {}
     for name in sorted(files):
         part = _NAMES.get(name.lower())
@@ -361,32 +375,32 @@ def _find_parts(files: Mapping[str, bytes], where: str, notes: list[str], *, alo
         if part in parts:
             raise UsageError(
                 "%(where)s: has both %(first)s and %(name)s, expected one %(part)s.",
-                where=where,
+                where=source_name,
                 first=parts[part],
                 name=name,
                 part=PART_FILES[part],
             )
         parts[part] = name
-    if parts or not alone:
+    if parts or not has_no_notebook:
         return parts
     python = sorted(name for name in files if name.lower().endswith(".py"))
-    looks: dict[Part, list[str]] = {"program": [], "responder": []}
+    guesses: dict[Part, list[str]] = {"program": [], "responder": []}
     for name in python[:3]:
-        looks[_guess_part(files[name], name)].append(name)
-    if len(python) == 1 or (len(python) == 2 and all(len(names) == 1 for names in looks.values())):
-        found: dict[Part, str] = {part: names[0] for part, names in looks.items() if names}
-        for part, name in found.items():
+        guesses[_guess_part(files[name], name)].append(name)
+    if len(python) == 1 or (len(python) == 2 and all(len(names) == 1 for names in guesses.values())):
+        guessed_parts: dict[Part, str] = {part: names[0] for part, names in guesses.items() if names}
+        for part, name in guessed_parts.items():
             notes.append(build_part_use_note(name, part))
-        return found
+        return guessed_parts
     found_names = ", ".join(sanitise_name(name) for name in sorted(files)[:5])
     advice = advise_on_kind(sorted(files))
-    instead = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
-    renamed = advise_on_names(PART_FILES, files) or instead
+    kind_advice = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
+    rename_advice = advise_on_names(PART_FILES, files) or kind_advice
     raise UsageError(
         "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",
-        where=where,
+        where=source_name,
         found=found_names,
-        renamed=renamed,
+        renamed=rename_advice,
     )
 
 
@@ -395,5 +409,5 @@ def _guess_part(data: bytes, name: str) -> Part:
     return "responder" if _LOOKS_LIKE_RESPONDER.search(text) else "program"
 
 
-def _describe_file(file: str, what: Sentence) -> Sentence:
-    return Sentence("%(file)s (%(what)s)", {"file": file, "what": what})
+def _describe_file(file: str, description: Sentence) -> Sentence:
+    return Sentence("%(file)s (%(what)s)", {"file": file, "what": description})

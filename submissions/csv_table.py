@@ -37,32 +37,32 @@ class CsvTable:
     rows: tuple[CsvRow, ...]
 
 
-def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual: str) -> CsvTable:
+def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual_columns: str) -> CsvTable:
     """Read a CSV file. ``columns`` gives the accepted headings of each requested column.
 
     Other columns are ignored. The separator is a comma, semicolon or tab; cells can be quoted; the text is UTF-8 with
-    or without a byte order mark. ``usual`` describes the header in error messages.
+    or without a byte order mark. ``usual_columns`` describes the header in error messages.
 
     Raises:
         UsageError: The file as a whole cannot be read.
     """
     lines = _read_text(path).splitlines(keepends=True)
     if not lines:
-        raise UsageError(f"{path.name}: is empty, expected the columns {usual}.")
+        raise UsageError(f"{path.name}: is empty, expected the columns {usual_columns}.")
     by_heading = {heading: column for column, headings in columns.items() for heading in headings}
     try:
-        header, *others = read_records(lines, _detect_separator(lines, by_heading))
+        header, *records = read_records(lines, _detect_separator(lines, by_heading))
     except UnreadableDataError as error:
         raise UsageError(f"{path.name}: cannot be read: {error}, expected a list of students.") from None
-    places = _find_columns(header, by_heading, path.name)
+    positions = _find_columns(header, by_heading, path.name)
     rows = [
-        _build_row(record, places, len(header.cells))
-        for record in others
+        _build_row(record, positions, len(header.cells))
+        for record in records
         if record.broken or any(map(str.strip, record.cells))
     ]
     if not rows:
         raise UsageError(f"{path.name}: has no rows, expected one for each student below the line of columns.")
-    return CsvTable(frozenset(places), tuple(rows))
+    return CsvTable(frozenset(positions), tuple(rows))
 
 
 def _read_text(path: Path) -> str:
@@ -97,25 +97,25 @@ def _find_columns(header: CsvRecord, by_heading: Mapping[str, str], name: str) -
     """Return the positions of the columns."""
     if header.broken:
         raise UsageError(f"{name}: line 1 {_QUOTES_PROBLEM}")
-    places: dict[str, int] = {}
+    positions: dict[str, int] = {}
     headings = [cell.strip() for cell in header.cells]
-    for place, cell in enumerate(headings):
+    for position, cell in enumerate(headings):
         column = by_heading.get(cell.casefold())
         if column is None:
             continue
-        if column in places:
-            both = dict.fromkeys([headings[places[column]], cell])
-            raise UsageError(f"{name}: has two columns {' and '.join(both)}, expected one.")
-        places[column] = place
-    return places
+        if column in positions:
+            heading_pair = dict.fromkeys([headings[positions[column]], cell])
+            raise UsageError(f"{name}: has two columns {' and '.join(heading_pair)}, expected one.")
+        positions[column] = position
+    return positions
 
 
-def _build_row(record: CsvRecord, places: Mapping[str, int], columns: int) -> CsvRow:
+def _build_row(record: CsvRecord, positions: Mapping[str, int], columns: int) -> CsvRow:
     if record.broken:
         return CsvRow(record.line, problem=_QUOTES_PROBLEM)
-    found = [cell.strip() for cell in record.cells]
-    if any(found[columns:]):
+    cells = [cell.strip() for cell in record.cells]
+    if any(cells[columns:]):
         return CsvRow(
-            record.line, problem=f"has {len(found)} cells for {columns} columns; quote a cell with a separator."
+            record.line, problem=f"has {len(cells)} cells for {columns} columns; quote a cell with a separator."
         )
-    return CsvRow(record.line, {column: found[at] if at < len(found) else "" for column, at in places.items()})
+    return CsvRow(record.line, {column: cells[at] if at < len(cells) else "" for column, at in positions.items()})

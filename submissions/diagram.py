@@ -72,10 +72,10 @@ class Diagram:
     @property
     def parts(self) -> int:
         """The effort to draw it: one part per actor, step, group and 200 characters of text."""
-        texts = sum(len(actor.label) for actor in self.actors)
+        text_length = sum(len(actor.label) for actor in self.actors)
         for step in self.steps:
-            texts += len(step.text) if isinstance(step, Divider) else len(step.label) + len(step.note)
-        return len(self.actors) + len(self.steps) + len(self.groups) + texts // _CHARACTERS_OF_PART
+            text_length += len(step.text) if isinstance(step, Divider) else len(step.label) + len(step.note)
+        return len(self.actors) + len(self.steps) + len(self.groups) + text_length // _CHARACTERS_OF_PART
 
     @property
     def arrows(self) -> tuple[DiagramArrow, ...]:

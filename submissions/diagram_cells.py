@@ -42,30 +42,30 @@ def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
 
     A diagram is omitted if it exceeds ``MOST_PARTS`` together with the earlier ones.
     """
-    left = MOST_PARTS
-    found: list[DiagramCell] = []
+    remaining_parts = MOST_PARTS
+    diagram_cells: list[DiagramCell] = []
     problems: list[str] = []
     for cell in notebook.cells if notebook is not None else ():
-        place = find_magic_line(cell.source)
+        magic_line = find_magic_line(cell.source)
         lines = cell.source.split("\n")
-        magic = _MAGIC.match(lines[place].lstrip("\ufeff").strip()) if place is not None else None
-        if place is None or magic is None:
+        magic = _MAGIC.match(lines[magic_line].lstrip("\ufeff").strip()) if magic_line is not None else None
+        if magic_line is None or magic is None:
             continue
-        if len(found) + len(problems) == MOST_DIAGRAMS:
+        if len(diagram_cells) + len(problems) == MOST_DIAGRAMS:
             problems.append(f"cell {cell.number}: of all diagrams only the first {MOST_DIAGRAMS} are drawn")
             break
         kind = cast(DiagramKind, magic["kind"])
         try:
-            diagram = read_diagram(kind, "\n".join(lines[place + 1 :]), place + 2)
+            diagram = read_diagram(kind, "\n".join(lines[magic_line + 1 :]), magic_line + 2)
         except UsageError as error:
             problems.append(f"cell {cell.number}, {error}; the diagram is not drawn")
             continue
-        if diagram.parts > left:
+        if diagram.parts > remaining_parts:
             problems.append(
                 f"cell {cell.number}: all diagrams together have more than {MOST_PARTS} actors, steps and texts; "
                 "this one is not drawn"
             )
             continue
-        left -= diagram.parts
-        found.append(DiagramCell(cell.number, diagram))
-    return NotebookDiagrams(tuple(found), tuple(problems))
+        remaining_parts -= diagram.parts
+        diagram_cells.append(DiagramCell(cell.number, diagram))
+    return NotebookDiagrams(tuple(diagram_cells), tuple(problems))

@@ -81,8 +81,8 @@ class _DiagramParser:
     def _enter_frame(self) -> bool:
         words = [token.text for token in self._tokens[:3]]
         for length in (1, 2, 3):
-            named = length == 1 or words[:1] in (["diagram"], [self._kind])
-            if words[length - 1 : length] == ["{"] and named:
+            has_kind = length == 1 or words[:1] in (["diagram"], [self._kind])
+            if words[length - 1 : length] == ["{"] and has_kind:
                 self._place = length
                 return True
         return False
@@ -92,26 +92,26 @@ class _DiagramParser:
     def _peek_token(self) -> DiagramToken | None:
         return self._tokens[self._place] if self._place < len(self._tokens) else None
 
-    def _is_sign(self, sign: str, ahead: int = 0) -> bool:
-        place = self._place + ahead
-        if place >= len(self._tokens):
+    def _is_sign(self, sign: str, lookahead: int = 0) -> bool:
+        position = self._place + lookahead
+        if position >= len(self._tokens):
             return False
-        token = self._tokens[place]
+        token = self._tokens[position]
         return token.text == sign and token.kind == "sign"
 
     def _take(self, sign: str) -> bool:
-        found = self._is_sign(sign)
-        self._place += found
-        return found
+        is_present = self._is_sign(sign)
+        self._place += is_present
+        return is_present
 
     def _expect(self, sign: str) -> None:
         if not self._take(sign):
             raise self._build_unexpected_error(sign)
 
-    def _take_word(self, what: str) -> str:
+    def _take_word(self, expected: str) -> str:
         token = self._peek_token()
         if token is None or token.kind not in ("name", "text"):
-            raise self._build_unexpected_error(what)
+            raise self._build_unexpected_error(expected)
         self._place += 1
         return token.text
 
@@ -234,14 +234,16 @@ class _DiagramParser:
     def _parse_arrows(self, chain: Sequence[Sequence[str]], signs: Sequence[DiagramToken], depth: int) -> None:
         attributes = self._parse_attributes(ARROW_ATTRIBUTES, "an arrow")
         returns: list[DiagramArrow] = []
-        for sign, left, right in zip(signs, chain[:-1], chain[1:], strict=True):
-            for one in left:
-                for other in right:
-                    arrow = self._build_arrow(one, sign.text, other, attributes)
+        for sign, sources, targets in zip(signs, chain[:-1], chain[1:], strict=True):
+            for source in sources:
+                for target in targets:
+                    arrow = self._build_arrow(source, sign.text, target, attributes)
                     self._add(arrow)
                     if sign.text == "=>" and self._kind == "seqdiag":
                         label = attributes.get("return", "")
-                        returns.append(replace(arrow, source=other, target=one, label=label, line="dashed", note=""))
+                        returns.append(
+                            replace(arrow, source=target, target=source, label=label, line="dashed", note="")
+                        )
         if self._is_sign("{"):
             self._expect("{")
             self._parse_statements(depth + 1)
@@ -249,18 +251,18 @@ class _DiagramParser:
         for arrow in reversed(returns):
             self._add(arrow)
 
-    def _build_arrow(self, one: str, sign: str, other: str, attributes: Attributes) -> DiagramArrow:
-        said = attributes.get("dir", "").lower()
-        sign = DIRECTIONS.get(said, said) if said else sign
-        back = sign.startswith("<") and sign != "<->"
+    def _build_arrow(self, source: str, sign: str, target: str, attributes: Attributes) -> DiagramArrow:
+        direction = attributes.get("dir", "").lower()
+        sign = DIRECTIONS.get(direction, direction) if direction else sign
+        is_reversed = sign.startswith("<") and sign != "<->"
         heads: ArrowHeads = "both" if sign == "<->" else "none" if sign == "--" else "target"
-        dashed = "--" in sign and sign != "--"
+        is_dashed = "--" in sign and sign != "--"
         side = next((name for name in ("leftnote", "rightnote", "note") if name in attributes), "")
         return DiagramArrow(
-            other if back else one,
-            one if back else other,
+            target if is_reversed else source,
+            source if is_reversed else target,
             attributes.get("label", ""),
-            LINE_STYLES.get(attributes.get("style", "").lower(), "dashed" if dashed else "solid"),
+            LINE_STYLES.get(attributes.get("style", "").lower(), "dashed" if is_dashed else "solid"),
             heads,
             ">>" in sign or "<<" in sign or "async" in attributes,
             "failed" in attributes,
@@ -289,30 +291,31 @@ class _DiagramParser:
             raise build_error(self._line(), f"there are too many actors, expected at most {MAX_ACTORS}")
         return name
 
-    def _parse_attributes(self, known: frozenset[str] | None, whose: str) -> Attributes:
+    def _parse_attributes(self, known_names: frozenset[str] | None, owner: str) -> Attributes:
         """Parse ``[label = "x", failed]`` any number of times, and replace a class by its attributes."""
-        found: Attributes = {}
+        attributes: Attributes = {}
         while self._take("["):
             while not self._take("]"):
                 if self._take(",") or self._take(";"):
                     continue
                 if self._is_sign("=", 1):
-                    name, value = self._parse_assignment(known, whose)
+                    name, value = self._parse_assignment(known_names, owner)
                 else:
-                    name, value = self._check_known(self._take_word("]"), known, whose), ""
-                found |= self._classes.get(value, {}) if name == "class" else {name: value}
-        return found
+                    name, value = self._check_known(self._take_word("]"), known_names, owner), ""
+                attributes |= self._classes.get(value, {}) if name == "class" else {name: value}
+        return attributes
 
-    def _parse_assignment(self, known: frozenset[str] | None, whose: str) -> tuple[str, str]:
-        name = self._check_known(self._take_word("the name of an attribute"), known, whose)
+    def _parse_assignment(self, known_names: frozenset[str] | None, owner: str) -> tuple[str, str]:
+        name = self._check_known(self._take_word("the name of an attribute"), known_names, owner)
         self._expect("=")
         return name, self._take_word(f"what {name} is")
 
-    def _check_known(self, name: str, known: frozenset[str] | None, whose: str) -> str:
-        if known is None or name in known:
+    def _check_known(self, name: str, known_names: frozenset[str] | None, owner: str) -> str:
+        if known_names is None or name in known_names:
             return name
         raise build_error(
-            self._line(), f"{name[:40]!r} is not an attribute of {whose}{suggest_word(name, known, 'label or color')}"
+            self._line(),
+            f"{name[:40]!r} is not an attribute of {owner}{suggest_word(name, known_names, 'label or color')}",
         )
 
     def _check_shape(self, shape: str) -> None:

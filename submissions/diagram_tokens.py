@@ -38,9 +38,9 @@ class DiagramToken:
     line: int
 
 
-def build_error(line: int, what: str) -> UsageError:
+def build_error(line: int, problem: str) -> UsageError:
     """Return an error for a line."""
-    return UsageError(f"line {line}: {what}")
+    return UsageError(f"line {line}: {problem}")
 
 
 def tokenize(text: str, first_line: int = 1) -> list[DiagramToken]:
@@ -51,18 +51,18 @@ def tokenize(text: str, first_line: int = 1) -> list[DiagramToken]:
     """
     if len(text) > MAX_CHARACTERS:
         raise build_error(first_line, f"the text is too long, expected at most {MAX_CHARACTERS} characters")
-    found: list[DiagramToken] = []
-    place, line = 0, first_line
-    while place < len(text):
-        match = _TOKEN.match(text, place)
+    tokens: list[DiagramToken] = []
+    position, line = 0, first_line
+    while position < len(text):
+        match = _TOKEN.match(text, position)
         if match is None:
-            raise build_error(line, _describe_unknown_sign(text[place:]))
+            raise build_error(line, _describe_unknown_sign(text[position:]))
         kind, piece = str(match.lastgroup), match[0]
         if kind not in ("space", "comment"):
-            found.append(DiagramToken(kind, _extract_content(kind, piece), line))
+            tokens.append(DiagramToken(kind, _extract_content(kind, piece), line))
         line += piece.count("\n")
-        place = match.end()
-    return found
+        position = match.end()
+    return tokens
 
 
 def _extract_content(kind: str, piece: str) -> str:
@@ -71,7 +71,7 @@ def _extract_content(kind: str, piece: str) -> str:
     return piece
 
 
-def _describe_unknown_sign(rest: str) -> str:
-    if rest[0] in _UNCLOSED and (rest[0] != "/" or rest.startswith("/*")):
-        return f"{_UNCLOSED[rest[0]]} never ends"
-    return f"{rest[0]!r} is not valid here, expected a name, an arrow such as ->, or a text in quotes"
+def _describe_unknown_sign(remaining_text: str) -> str:
+    if remaining_text[0] in _UNCLOSED and (remaining_text[0] != "/" or remaining_text.startswith("/*")):
+        return f"{_UNCLOSED[remaining_text[0]]} never ends"
+    return f"{remaining_text[0]!r} is not valid here, expected a name, an arrow such as ->, or a text in quotes"

@@ -51,7 +51,7 @@ ARROWS = MappingProxyType(
 FRAGMENTS = ("alt", "loop")
 
 
-def suggest_word(word: str, known: frozenset[str], otherwise: str) -> str:
+def suggest_word(word: str, known_words: frozenset[str], example: str) -> str:
     """Return the end of a message about an unknown word: the probable meaning, or the expected words."""
-    near = difflib.get_close_matches(word[:40], sorted(known), 1)
-    return f"; did you mean {near[0]}?" if near else f", expected one such as {otherwise}"
+    matches = difflib.get_close_matches(word[:40], sorted(known_words), 1)
+    return f"; did you mean {matches[0]}?" if matches else f", expected one such as {example}"

@@ -55,12 +55,12 @@ def list_student_files(folder: Path) -> list[DownloadedFiles]:
     if _is_nbgrader(folder, entries):
         return list(_read_nbgrader(entries))
     moodle = {entry: found for entry in entries if (found := _MOODLE.fullmatch(entry.name))}
-    plain = [
+    other_files = [
         DownloadedFiles(sanitise_name(entry.name), Student(derive_student_name(entry)), entry)
         for entry in entries
         if entry not in moodle
     ]
-    return [*_read_moodle(moodle), *plain]
+    return [*_read_moodle(moodle), *other_files]
 
 
 def is_student_folder(folder: Path) -> bool:
@@ -70,27 +70,27 @@ def is_student_folder(folder: Path) -> bool:
 
 def parse_moodle_number(source: str) -> str:
     """Return Moodle's number in the name of a submission; empty for other sources."""
-    found = _MOODLE.fullmatch(source)
-    return found["number"] if found else ""
+    match = _MOODLE.fullmatch(source)
+    return match["number"] if match else ""
 
 
 def _list_visible(folder: Path) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if not entry.name.startswith(".") and entry.name not in IGNORED)
 
 
-def _read_moodle(found: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
+def _read_moodle(matches: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFiles]:
     """Yield a row for each number, with its folder or with the files that begin with it."""
     by_number: dict[str, list[Path]] = {}
-    for path, match in found.items():
+    for path, match in matches.items():
         by_number.setdefault(match["number"], []).append(path)
-    names = {number: found[paths[0]]["name"] for number, paths in by_number.items()}
+    names = {number: matches[paths[0]]["name"] for number, paths in by_number.items()}
     people = {number: _GROUP.sub("", name, count=1).strip() for number, name in names.items()}
     ids = make_unique_ids((name, number) for number, name in people.items())
-    for (number, paths), own in zip(by_number.items(), ids, strict=True):
+    for (number, paths), student_id in zip(by_number.items(), ids, strict=True):
         name = people[number]
-        hidden = name == HIDDEN_NAME
-        student = Student(f"{HIDDEN_NAME} {number}") if hidden else Student(own, name)
-        files = {(found[path]["file"] or path.name): path for path in paths if found[path]["plugin"] == "file"}
+        is_hidden = name == HIDDEN_NAME
+        student = Student(f"{HIDDEN_NAME} {number}") if is_hidden else Student(student_id, name)
+        files = {(matches[path]["file"] or path.name): path for path in paths if matches[path]["plugin"] == "file"}
         folders = [path for path in files.values() if path.is_dir()]
         problem = "" if files else "was typed into Moodle's text box, expected files."
         # Messages use the folder's own name. A shortened name would lose the number.
@@ -108,25 +108,25 @@ def _read_gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[Download
     # Imported here, because only Gradescope exports need it.
     from submissions.gradescope_list import read_gradescope_list
 
-    listed = read_gradescope_list(folder / _GRADESCOPE_LIST)
-    there = [entry.name for entry in entries if _is_folder(entry)]
-    for name in dict.fromkeys([*listed, *there]):
-        own = listed.get(name)
-        submitters = list(_read_submitters(own))
+    submissions = read_gradescope_list(folder / _GRADESCOPE_LIST)
+    folder_names = [entry.name for entry in entries if _is_folder(entry)]
+    for name in dict.fromkeys([*submissions, *folder_names]):
+        entry = submissions.get(name)
+        submitters = list(_read_submitters(entry))
         problem = "" if submitters else f"is nobody's in {_GRADESCOPE_LIST}, expected its submitters there."
-        if name not in there:
+        if name not in folder_names:
             problem = f"is in {_GRADESCOPE_LIST} and not beside it, expected a folder of that name."
-        when = own.get(":created_at") if isinstance(own, dict) else None
+        created_at = entry.get(":created_at") if isinstance(entry, dict) else None
         for student in submitters or [UNKNOWN_STUDENT]:
             yield DownloadedFiles(
-                sanitise_name(name), student, folder / name, submitted_at=_parse_time(when), problem=problem
+                sanitise_name(name), student, folder / name, submitted_at=_parse_time(created_at), problem=problem
             )
 
 
-def _read_submitters(own: object) -> Iterator[Student]:
-    listed = own.get(":submitters") if isinstance(own, dict) else None
-    for each in listed if isinstance(listed, list) else []:
-        sid, name, email = (_read_text(each, key) for key in (":sid", ":name", ":email"))
+def _read_submitters(entry: object) -> Iterator[Student]:
+    submitters = entry.get(":submitters") if isinstance(entry, dict) else None
+    for submitter in submitters if isinstance(submitters, list) else []:
+        sid, name, email = (_read_text(submitter, key) for key in (":sid", ":name", ":email"))
         if sid or name or email:
             yield Student(sid or email or name, name, email)
 
@@ -136,38 +136,44 @@ def _read_text(table: object, key: str) -> str:
     return value.strip() if isinstance(value, str) and value.strip() not in ("~", "null") else ""
 
 
-def _parse_time(written: object) -> datetime | None:
+def _parse_time(value: object) -> datetime | None:
     """Parse a Ruby timestamp, which is inside a table if it has a zone; None if it cannot be read."""
-    text = _read_text(written, "utc") if isinstance(written, dict) else written
-    found = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
-    if found is None:
+    text = _read_text(value, "utc") if isinstance(value, dict) else value
+    match = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
+    if match is None:
         return None
-    zone = found[4] if found[4] and found[4][0] in "+-" else "+00:00"
+    zone = match[4] if match[4] and match[4][0] in "+-" else "+00:00"
     try:
-        return datetime.fromisoformat(f"{found[1]}T{found[2]}{zone}").astimezone(UTC)
+        return datetime.fromisoformat(f"{match[1]}T{match[2]}{zone}").astimezone(UTC)
     except ValueError:
         return None
 
 
 def _is_nbgrader(folder: Path, entries: Sequence[Path]) -> bool:
     """Return whether the folder has student folders that contain only assignment folders."""
-    inside = [entry for student in entries if _is_folder(student) for entry in _list_visible(student)]
-    folders_alone = all(_is_folder(entry) for entry in (*entries, *inside))
-    timed = any((entry / _NBGRADER_TIME).is_file() for entry in inside)
-    return bool(inside) and folders_alone and (timed or folder.name == _NBGRADER)
+    entries_inside = [entry for student in entries if _is_folder(student) for entry in _list_visible(student)]
+    folders_alone = all(_is_folder(entry) for entry in (*entries, *entries_inside))
+    has_timestamp = any((entry / _NBGRADER_TIME).is_file() for entry in entries_inside)
+    return bool(entries_inside) and folders_alone and (has_timestamp or folder.name == _NBGRADER)
 
 
 def _read_nbgrader(entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     for student in entries:
-        for own in _list_visible(student):
+        for assignment_folder in _list_visible(student):
             files = {
-                path.name: path for path in _list_visible(own) if path.name != _NBGRADER_TIME and not path.is_dir()
+                path.name: path
+                for path in _list_visible(assignment_folder)
+                if path.name != _NBGRADER_TIME and not path.is_dir()
             }
-            stamp = own / _NBGRADER_TIME
-            when = _read_beginning(stamp) if stamp.is_file() else ""
-            source = sanitise_name(f"{student.name}/{own.name}")
+            stamp = assignment_folder / _NBGRADER_TIME
+            timestamp = _read_beginning(stamp) if stamp.is_file() else ""
+            source = sanitise_name(f"{student.name}/{assignment_folder.name}")
             yield DownloadedFiles(
-                source, Student(student.name), files, assignment=own.name, submitted_at=_parse_time(when)
+                source,
+                Student(student.name),
+                files,
+                assignment=assignment_folder.name,
+                submitted_at=_parse_time(timestamp),
             )
 
 

@@ -57,31 +57,31 @@ _MOST_ENTRIES = 2000
 def advise_on_kind(names: Iterable[str]) -> Sentence | None:
     """Return advice for the first file of a type that is not a program; None if there is none."""
     for name in names:
-        known = _KINDS.get(PurePosixPath(name.lower()).suffix)
-        if known is not None:
-            values = {"name": sanitise_name(name), "kind": known[0], "advice": known[1]}
+        file_kind = _KINDS.get(PurePosixPath(name.lower()).suffix)
+        if file_kind is not None:
+            values = {"name": sanitise_name(name), "kind": file_kind[0], "advice": file_kind[1]}
             return Sentence("%(name)s is %(kind)s, not a program: %(advice)s", values)
     return None
 
 
 def find_similar_file(part: Part, names: Iterable[str]) -> str:
     """Return the file whose name is most similar to the part's name; empty if none is similar."""
-    word = PART_FILES[part].removesuffix(".py")
+    stem_name = PART_FILES[part].removesuffix(".py")
     texts = ((name, name.lower().removesuffix(".txt")) for name in sorted(names) if name != SECOND_PROGRAM)
-    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == word}
-    near = difflib.get_close_matches(word, stems.values(), 1, 0.75)
-    return next((name for name, stem in stems.items() if word in stem or stem in near), "")
+    stems = {name: text.removesuffix(".py") for name, text in texts if text.endswith(".py") or text == stem_name}
+    matches = difflib.get_close_matches(stem_name, stems.values(), 1, 0.75)
+    return next((name for name, stem in stems.items() if stem_name in stem or stem in matches), "")
 
 
-def advise_on_names(missing: Iterable[Part], files: Iterable[str]) -> str | Sentence:
+def advise_on_names(missing_parts: Iterable[Part], files: Iterable[str]) -> str | Sentence:
     """Return advice to rename similar files to the missing parts; empty if no name is similar."""
-    found = {part: find_similar_file(part, files) for part in missing}
-    renamed = [
+    similar_files = {part: find_similar_file(part, files) for part in missing_parts}
+    renames = [
         Sentence("%(name)s to %(part)s", {"name": sanitise_name(name), "part": PART_FILES[part]})
-        for part, name in found.items()
+        for part, name in similar_files.items()
         if name
     ]
-    return Sentence("; rename %(files)s", {"files": join_with_and(renamed)}) if renamed else ""
+    return Sentence("; rename %(files)s", {"files": join_with_and(renames)}) if renames else ""
 
 
 def is_compiled(name: str, data: bytes) -> bool:

@@ -21,11 +21,11 @@ def read_gradescope_list(path: Path) -> dict[str, Any]:
     """
     try:
         with path.open("rb") as stream:
-            listed = read_yaml(stream.read(MOST_BYTES + 1))
+            submissions = read_yaml(stream.read(MOST_BYTES + 1))
     except OSError as error:
         raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
     except UnreadableDataError as error:
         raise UsageError(f"{path.name}: cannot be read: {error}, expected the file exported from Gradescope.") from None
-    if not isinstance(listed, dict):
+    if not isinstance(submissions, dict):
         raise UsageError(f"{path.name}: is not a list of submissions, expected the file exported from Gradescope.")
-    return {name: own for name, own in listed.items() if isinstance(name, str)}
+    return {name: own for name, own in submissions.items() if isinstance(name, str)}

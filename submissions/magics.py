@@ -76,8 +76,8 @@ class Flags:
 
     def with_values(self, **values: str | None) -> Flags:
         """Return these flags with some values replaced; None leaves a value unchanged."""
-        given = {key: value for key, value in values.items() if value is not None}
-        return replace(self, values=self.values | given)
+        changes = {key: value for key, value in values.items() if value is not None}
+        return replace(self, values=self.values | changes)
 
     def remove_value(self, flag: str) -> Flags:
         """Return these flags without one value."""
@@ -105,21 +105,25 @@ def split_program(text: str) -> tuple[Flags, str]:
     Raises:
         UsageError: A magic or a flag does not exist.
     """
-    place = find_magic_line(text)
-    if place is None:
+    magic_line = find_magic_line(text)
+    if magic_line is None:
         return Flags(), text
-    return parse_magic(text.split("\n")[place].lstrip("\ufeff").strip(), place + 1), _comment_out_lines(place, text)
+    return parse_magic(text.split("\n")[magic_line].lstrip("\ufeff").strip(), magic_line + 1), _comment_out_lines(
+        magic_line, text
+    )
 
 
 def comment_out_magic(text: str) -> str:
     """Return the program with its magic line as an empty comment, so that line numbers stay the same."""
-    place = find_magic_line(text)
-    return text if place is None else _comment_out_lines(place, text)
+    magic_line = find_magic_line(text)
+    return text if magic_line is None else _comment_out_lines(magic_line, text)
 
 
-def _comment_out_lines(place: int, text: str) -> str:
+def _comment_out_lines(magic_line: int, text: str) -> str:
     lines = text.split("\n")
-    lines[: place + 1] = ["#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: place + 1]]
+    lines[: magic_line + 1] = [
+        "#" if line.lstrip("\ufeff \t").startswith("%") else line for line in lines[: magic_line + 1]
+    ]
     return "\n".join(lines)
 
 
@@ -129,11 +133,11 @@ def parse_magic(line: str, number: int = 1) -> Flags:
     Raises:
         UsageError: A magic or a flag does not exist. The message has the line ``number``.
     """
-    name, *rest = line.lstrip("%").split(maxsplit=1) or [""]
-    if name.startswith("%") and (meant := name.lstrip("%")[:40]):
-        raise UsageError(f"line {number}: there is a blank between the percent signs; expected %%{meant}")
+    name, *arguments = line.lstrip("%").split(maxsplit=1) or [""]
+    if name.startswith("%") and (intended_name := name.lstrip("%")[:40]):
+        raise UsageError(f"line {number}: there is a blank between the percent signs; expected %%{intended_name}")
     try:
-        return parse_flags(name, "".join(rest))
+        return parse_flags(name, "".join(arguments))
     except UsageError as error:
         raise UsageError(f"line {number}: {error}") from None
 
@@ -146,12 +150,12 @@ def parse_flags(name: str, arguments: str) -> Flags:
     """
     if name not in PREAMBLES:
         expected = ", ".join(f"%%{known}" for known in PREAMBLES)
-        near = suggest_name(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
-        raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}{near}")
+        hint = suggest_name(f"%%{name[:40]}", (f"%%{known}" for known in PREAMBLES))
+        raise UsageError(f"%{name[:40]} is not a magic that starts a program; expected one of {expected}{hint}")
     flags = _parse_words(_split_arguments(name, arguments), PREAMBLES[name])
-    foreign = sorted(flags.switches & _PLAIN_ONLY)
-    if name != "sim_magic" and foreign:
-        raise UsageError(f"%%{name} has no flag -{foreign[0]}; only %sim_magic has it")
+    foreign_flags = sorted(flags.switches & _PLAIN_ONLY)
+    if name != "sim_magic" and foreign_flags:
+        raise UsageError(f"%%{name} has no flag -{foreign_flags[0]}; only %sim_magic has it")
     return flags
 
 
@@ -165,55 +169,57 @@ def _split_arguments(name: str, arguments: str) -> list[str]:
 def _parse_words(words: list[str], preamble: Preamble) -> Flags:
     values: dict[str, str] = {}
     switches: set[str] = set()
-    waiting = list(words)
-    while waiting:
-        word = waiting.pop(0)
+    remaining_words = list(words)
+    while remaining_words:
+        word = remaining_words.pop(0)
         if word.startswith("--"):
-            long, equals, value = word[2:].partition("=")
-            if long == _PREVIEW_CODE and preamble != "none":
+            long_name, separator, value = word[2:].partition("=")
+            if long_name == _PREVIEW_CODE and preamble != "none":
                 continue
-            short = _find_short_flag(long)
-            if short in _VALUED:
-                values[short] = value if equals else _take_value(waiting, word)
+            letter = _find_short_flag(long_name)
+            if letter in _VALUED:
+                values[letter] = value if separator else _take_value(remaining_words, word)
             else:
-                switches.add(short)
+                switches.add(letter)
         elif word.startswith("-") and len(word) > 1:
-            _parse_short_flags(word[1:], waiting, values, switches)
+            _parse_short_flags(word[1:], remaining_words, values, switches)
         else:
             raise UsageError(f"{word[:40]!r} is not a flag")
     return Flags(preamble, values, frozenset(switches))
 
 
-def _find_short_flag(long: str) -> str:
+def _find_short_flag(long_name: str) -> str:
     """Return the letter of a long flag. Like the course's magics, accept any unambiguous prefix."""
-    found = [long] if long in _LONG else [name for name in _LONG if long and name.startswith(long)]
-    if len(found) == 1:
-        return _LONG[found[0]]
-    if found:
-        raise UsageError(f"--{long[:40]} may be {' or '.join(f'--{name}' for name in found)}")
-    near = suggest_name(f"--{long[:40]}", (f"--{name}" for name in _LONG))
-    raise UsageError(f"there is no flag --{long[:40]}" + (near or "; --help of the course's magic lists them"))
+    long_names = (
+        [long_name] if long_name in _LONG else [name for name in _LONG if long_name and name.startswith(long_name)]
+    )
+    if len(long_names) == 1:
+        return _LONG[long_names[0]]
+    if long_names:
+        raise UsageError(f"--{long_name[:40]} may be {' or '.join(f'--{name}' for name in long_names)}")
+    hint = suggest_name(f"--{long_name[:40]}", (f"--{name}" for name in _LONG))
+    raise UsageError(f"there is no flag --{long_name[:40]}" + (hint or "; --help of the course's magic lists them"))
 
 
-def _parse_short_flags(letters: str, waiting: list[str], values: dict[str, str], switches: set[str]) -> None:
+def _parse_short_flags(letters: str, remaining_words: list[str], values: dict[str, str], switches: set[str]) -> None:
     """Parse combined short flags (-HWZ). A flag with a value takes the rest of the word, or the next word."""
-    for place, letter in enumerate(letters):
+    for index, letter in enumerate(letters):
         if letter in _SWITCHES:
             switches.add(letter)
         elif letter in _VALUED:
-            rest = letters[place + 1 :].removeprefix("=")
-            values[letter] = rest if rest else _take_value(waiting, f"-{letter}")
+            value = letters[index + 1 :].removeprefix("=")
+            values[letter] = value if value else _take_value(remaining_words, f"-{letter}")
             return
         else:
-            other = letter.swapcase()
-            near = f"; did you mean -{other}?" if other in _SWITCHES or other in _VALUED else ""
-            raise UsageError(f"there is no flag -{letter}{near}")
+            other_case = letter.swapcase()
+            hint = f"; did you mean -{other_case}?" if other_case in _SWITCHES or other_case in _VALUED else ""
+            raise UsageError(f"there is no flag -{letter}{hint}")
 
 
-def _take_value(waiting: list[str], flag: str) -> str:
-    if not waiting:
+def _take_value(remaining_words: list[str], flag: str) -> str:
+    if not remaining_words:
         raise UsageError(f"{flag} needs a value")
-    return waiting.pop(0)
+    return remaining_words.pop(0)
 
 
 def apply_flags(flags: Flags) -> SimulatorSettings:
@@ -249,17 +255,17 @@ class SimulatorPage:
         """
         self._notes = []
         values = flags.values
-        wanted = {flag: self._parse_slider(flag, values, most) for flag, most in _SLIDERS.items()}
+        sliders = {flag: self._parse_slider(flag, values, most) for flag, most in _SLIDERS.items()}
         if "r" in values:
             self._choose_robot(values["r"])
         if "b" in values:
             self._choose_background(values["b"])
         if "o" in values:
             self._choose_obstacles(values["o"])
-        x, y, angle = wanted["x"], wanted["y"], wanted["a"]
+        x, y, angle = sliders["x"], sliders["y"], sliders["a"]
         if "m" in flags.switches or x is not None or y is not None or angle is not None:
             self._move(x, y, angle)
-        self._choose_noise(wanted["N"], wanted["M"])
+        self._choose_noise(sliders["N"], sliders["M"])
         if "P" in values and values["P"] not in _PEN_COLOURS:
             self._add_note(f"-P {values['P'][:40]} is not a pen colour; expected one of {', '.join(_PEN_COLOURS)}")
         return SimulatorSettings(
@@ -280,8 +286,8 @@ class SimulatorPage:
 
     def _choose_robot(self, name: str) -> None:
         if name not in WIDENED:
-            near = suggest_name(name[:40], WIDENED)
-            self._add_note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{near}")
+            hint = suggest_name(name[:40], WIDENED)
+            self._add_note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{hint}")
             name = "Default_Robot"
         self.robot = self._chosen = name
         self.pose = _AFTER_ROBOT
@@ -290,8 +296,8 @@ class SimulatorPage:
 
     def _choose_background(self, name: str) -> None:
         if name not in list_floor_names():
-            near = suggest_name(name[:40], list_floor_names())
-            self._add_note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{near}")
+            hint = suggest_name(name[:40], list_floor_names())
+            self._add_note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{hint}")
             name = "Empty_Map"
         self.background = name
         self.pose, self.obstacles = get_floor_start(name)
@@ -309,9 +315,9 @@ class SimulatorPage:
         if name in OBSTACLE_PRESETS and name != "None":
             self.obstacles = OBSTACLE_PRESETS[name]
         elif name != "None":
-            near = suggest_name(name[:40], OBSTACLE_PRESETS)
+            hint = suggest_name(name[:40], OBSTACLE_PRESETS)
             self._add_note(
-                f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{near}"
+                f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{hint}"
             )
         elif self.obstacles:
             self._add_note(
@@ -325,24 +331,26 @@ class SimulatorPage:
             )
         if light is not None:
             self._noise["N"] = light if self._noise_is_heard else 0.0
-            before = self.pose
+            old_pose = self.pose
             self._move(None, None, None)
-            if before.heading != self.pose.heading:
+            if old_pose.heading != self.pose.heading:
                 self._add_note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
         if motor is not None:
             self._noise["M"] = motor if self._noise_is_heard else 0.0
 
-    def _parse_slider(self, flag: str, values: dict[str, str], most: int) -> int | None:
+    def _parse_slider(self, flag: str, values: dict[str, str], maximum: int) -> int | None:
         """Return a whole number, clamped to the slider's range."""
         if flag not in values:
             return None
         try:
-            wanted = int(values[flag])
+            number = int(values[flag])
         except ValueError:
-            raise UsageError(f"-{flag} {values[flag][:40]}: expected a whole number between 0 and {most}") from None
-        value = min(max(wanted, 0), most)
-        if value != wanted:
-            self._add_note(f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {most}")
+            raise UsageError(f"-{flag} {values[flag][:40]}: expected a whole number between 0 and {maximum}") from None
+        value = min(max(number, 0), maximum)
+        if value != number:
+            self._add_note(
+                f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {maximum}"
+            )
         return value
 
     def _move(self, x: int | None, y: int | None, angle: int | None) -> None:
@@ -366,6 +374,6 @@ class SimulatorPage:
 _SLIDERS = {"x": _X_MOST, "y": _Y_MOST, "a": _ANGLE_MOST, "N": _LIGHT_NOISE_MOST, "M": _MOTOR_NOISE_MOST}
 
 
-def _to_slider_value(value: float, most: int) -> int:
+def _to_slider_value(value: float, maximum: int) -> int:
     """Return the slider value for a coordinate. JavaScript rounds halves up."""
-    return min(max(math.floor(value + 0.5), 0), most)
+    return min(max(math.floor(value + 0.5), 0), maximum)

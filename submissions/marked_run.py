@@ -87,46 +87,50 @@ def find_runs(notebook: Notebook) -> tuple[ProgramRun, ...]:
 
     The results for the last notebooks are cached, because intake and grading use the same ones.
     """
-    found: list[ProgramRun] = []
+    runs: list[ProgramRun] = []
     program: Cell | None = None
     floor: str | None = None
     for cell in notebook.cells:
-        begin = _find_program_line(cell)
-        program = program if begin is None else cell
+        program_line = _find_program_line(cell)
+        program = program if program_line is None else cell
         magic = parse_cell_magic(cell.source)
-        is_python = begin is None and (magic is None or magic.name in WRAPPERS)
+        is_python = program_line is None and (magic is None or magic.name in WRAPPERS)
         for number, line in enumerate(cell.source.split("\n"), 1):
             flags = _LINE.search(line)
-            floor = _parse_floor(line, flags, number == begin) or floor
-            if number == begin or (is_python and _is_restart(line, flags)):
-                known = None if floor is None or _EXPANDED.search(floor) else floor
-                found.append(ProgramRun(len(found) + 1, RunSite(cell.number, number), program, number == begin, known))
-    return tuple(found)
+            floor = _parse_floor(line, flags, number == program_line) or floor
+            if number == program_line or (is_python and _is_restart(line, flags)):
+                known_floor = None if floor is None or _EXPANDED.search(floor) else floor
+                runs.append(
+                    ProgramRun(
+                        len(runs) + 1, RunSite(cell.number, number), program, number == program_line, known_floor
+                    )
+                )
+    return tuple(runs)
 
 
-def choose_run(notebook: Notebook, assignment: Assignment, asked: str | None) -> RunChoice:
-    """Return the run that the assignment names, otherwise the run ``asked`` for, otherwise the last one that fits.
+def choose_run(notebook: Notebook, assignment: Assignment, requested_run: str | None) -> RunChoice:
+    """Return the run that the assignment names, otherwise ``requested_run``, otherwise the last one that fits.
 
     Raises:
         UsageError: The run does not exist.
     """
-    marked = find_run(notebook, assignment.parts.cell, asked)
+    marked_run = find_run(notebook, assignment.parts.cell, requested_run)
     if assignment.parts.cell != LAST:
-        named = f"run = {asked} is not used: the assignment says which run is marked"
-        return RunChoice(marked, True, notes=(named,) if asked is not None else ())
+        ignored_note = f"run = {requested_run} is not used: the assignment says which run is marked"
+        return RunChoice(marked_run, True, notes=(ignored_note,) if requested_run is not None else ())
     runs = find_runs(notebook)
     misfits = {run: tuple(_find_mismatches(run, assignment)) for run in runs}
-    if asked is not None:
-        return RunChoice(marked, True, notes=_explain_choice(misfits, marked, f"as run = {asked} asks"))
-    best, *others = sorted(runs, key=lambda run: (len(misfits[run]), -run.number))
-    why = "the last that fits" if not misfits[best] else f"which fits best, though {', '.join(misfits[best])}"
-    return RunChoice(best, False, tuple(run.site for run in others), _explain_choice(misfits, best, why))
+    if requested_run is not None:
+        return RunChoice(marked_run, True, notes=_explain_choice(misfits, marked_run, f"as run = {requested_run} asks"))
+    best, *other_runs = sorted(runs, key=lambda run: (len(misfits[run]), -run.number))
+    reason = "the last that fits" if not misfits[best] else f"which fits best, though {', '.join(misfits[best])}"
+    return RunChoice(best, False, tuple(run.site for run in other_runs), _explain_choice(misfits, best, reason))
 
 
-def find_run(notebook: Notebook, which: str, asked: str | None = None) -> ProgramRun:
-    """Return the run for ``which``: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
+def find_run(notebook: Notebook, selector: str, requested_run: str | None = None) -> ProgramRun:
+    """Return the run for ``selector``: ``last``, ``tag:NAME``, or the number of a robot program, from 1.
 
-    ``last`` leaves the choice to the submission: ``asked`` is the number of a run, or a tag.
+    ``last`` leaves the choice to the submission: ``requested_run`` is the number of a run, or a tag.
 
     Raises:
         UsageError: The run does not exist. The message lists the existing runs.
@@ -138,13 +142,13 @@ def find_run(notebook: Notebook, which: str, asked: str | None = None) -> Progra
             name=notebook.name,
             near=describe_near_program(notebook),
         )
-    if which == LAST and asked is not None:
-        return _find_requested_run(notebook, runs, asked)
-    if which == LAST:
+    if selector == LAST and requested_run is not None:
+        return _find_requested_run(notebook, runs, requested_run)
+    if selector == LAST:
         return runs[-1]
-    if not which.isdecimal():
-        return _find_tagged_run(notebook, runs, which.removeprefix(_TAG))
-    number, programs = int(which), [run for run in runs if run.begins]
+    if not selector.isdecimal():
+        return _find_tagged_run(notebook, runs, selector.removeprefix(_TAG))
+    number, programs = int(selector), [run for run in runs if run.begins]
     if number > len(programs):
         raise UsageError(
             "%(name)s: has %(count)s, expected at least %(number)s: number %(number)s is marked.",
@@ -155,66 +159,67 @@ def find_run(notebook: Notebook, which: str, asked: str | None = None) -> Progra
     return programs[number - 1]
 
 
-def _find_requested_run(notebook: Notebook, runs: Sequence[ProgramRun], asked: str) -> ProgramRun:
-    if not asked.isdecimal():
-        return _find_tagged_run(notebook, runs, asked.removeprefix(_TAG))
-    if not 1 <= int(asked) <= len(runs):
+def _find_requested_run(notebook: Notebook, runs: Sequence[ProgramRun], requested_run: str) -> ProgramRun:
+    if not requested_run.isdecimal():
+        return _find_tagged_run(notebook, runs, requested_run.removeprefix(_TAG))
+    if not 1 <= int(requested_run) <= len(runs):
         raise UsageError(
             "%(name)s: has no run %(asked)s, expected a number from 1 to %(most)s, or a tag.",
             name=notebook.name,
-            asked=asked,
+            asked=requested_run,
             most=len(runs),
         )
-    return runs[int(asked) - 1]
+    return runs[int(requested_run) - 1]
 
 
 def _find_tagged_run(notebook: Notebook, runs: Sequence[ProgramRun], tag: str) -> ProgramRun:
-    tagged = [cell.number for cell in notebook.cells if tag in cell.tags]
-    if not tagged:
+    tagged_cells = [cell.number for cell in notebook.cells if tag in cell.tags]
+    if not tagged_cells:
         raise UsageError(
             '%(name)s: has no cell with the tag "%(tag)s", expected it on the cell with the robot program; '
             "it is lost when a notebook is saved as .py.",
             name=notebook.name,
             tag=tag,
         )
-    found = [run for run in runs if run.site.cell in tagged]
-    if not found:
+    tagged_runs = [run for run in runs if run.site.cell in tagged_cells]
+    if not tagged_runs:
         raise UsageError(
             '%(name)s: cell %(cell)s has the tag "%(tag)s" but runs no robot, expected '
             "%%%%sim_magic_preloaded as its first line.",
             name=notebook.name,
-            cell=tagged[-1],
+            cell=tagged_cells[-1],
             tag=tag,
         )
-    return found[-1]
+    return tagged_runs[-1]
 
 
-def _explain_choice(misfits: dict[ProgramRun, tuple[str, ...]], marked: ProgramRun, why: str) -> tuple[str, ...]:
+def _explain_choice(misfits: dict[ProgramRun, tuple[str, ...]], marked_run: ProgramRun, reason: str) -> tuple[str, ...]:
     if len(misfits) < 2:
         return ()
-    others = [_describe_other_run(run, found) for run, found in misfits.items() if run != marked]
-    more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
+    other_runs = [_describe_other_run(run, found) for run, found in misfits.items() if run != marked_run]
+    more_text = f" and {len(other_runs) - _MOST_SHOWN} more" if len(other_runs) > _MOST_SHOWN else ""
     return (
-        f"that is run {marked.number} of {len(misfits)}, {why}; the others are {', '.join(others[:_MOST_SHOWN])}{more}",
+        f"that is run {marked_run.number} of {len(misfits)}, {reason}; the others are "
+        f"{', '.join(other_runs[:_MOST_SHOWN])}{more_text}",
         "another run is marked with --run NUMBER, or with run = NUMBER in submission.toml",
     )
 
 
 def _describe_other_run(run: ProgramRun, misfits: Sequence[str]) -> str:
-    why = f": {misfits[0]}" if misfits else ""
-    return f"run {run.number} (cell {run.site.cell}{why})"
+    reason = f": {misfits[0]}" if misfits else ""
+    return f"run {run.number} (cell {run.site.cell}{reason})"
 
 
 def _find_mismatches(run: ProgramRun, assignment: Assignment) -> Iterator[str]:
     """Yield the reasons why a run does not fit the assignment."""
-    world, answered = assignment.world, assignment.parts.responder != "none"
+    world, has_responder = assignment.world, assignment.parts.responder != "none"
     text = run.program.source if run.program is not None else ""
     if world.image is None and run.floor is not None and run.floor != world.background:
         yield f"its floor is {run.floor[:40]}"
-    sends = any(word in text for word in _SENDS)
-    if answered and not sends:
+    is_sending = any(word in text for word in _SENDS)
+    if has_responder and not is_sending:
         yield "it sends nothing to the responder"
-    if not (answered and sends) and _is_test(comment_out_magic(text)):
+    if not (has_responder and is_sending) and _is_test(comment_out_magic(text)):
         yield "it only prints"
 
 
@@ -229,29 +234,29 @@ def _is_test(text: str) -> bool:
     except (SyntaxError, UnreadableDataError):
         return False
     statements = [node for node in nodes if isinstance(node, ast.stmt)]
-    called = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
-    return len(statements) <= _TEST_STATEMENTS and set(called) <= {"print"}
+    called_names = [ast.unparse(node.func) for node in nodes if isinstance(node, ast.Call)]
+    return len(statements) <= _TEST_STATEMENTS and set(called_names) <= {"print"}
 
 
 def _find_program_line(cell: Cell) -> int | None:
     """Return the line, from 1, of the magic that makes the cell a robot program."""
-    place = find_magic_line(cell.source)
-    if place is None or not is_program_magic(cell.source.split("\n")[place]):
+    magic_line = find_magic_line(cell.source)
+    if magic_line is None or not is_program_magic(cell.source.split("\n")[magic_line]):
         return None
-    return place + 1
+    return magic_line + 1
 
 
 def _is_restart(line: str, flags: re.Match[str] | None) -> bool:
     return bool(_CALL.search(line) or (flags and _AUTORUN.search(flags["flags"])))
 
 
-def _parse_floor(line: str, again: re.Match[str] | None, begins: bool) -> str | None:
+def _parse_floor(line: str, restart_flags: re.Match[str] | None, is_first_line: bool) -> str | None:
     """Return the background named in a magic's line."""
     try:
-        if begins:
+        if is_first_line:
             flags = parse_magic(line.lstrip("\ufeff").strip())
-        elif again:
-            flags = parse_flags("sim_magic", re.split(r"""['"]""", again["flags"])[0])
+        elif restart_flags:
+            flags = parse_flags("sim_magic", re.split(r"""['"]""", restart_flags["flags"])[0])
         else:
             return None
     except UsageError:

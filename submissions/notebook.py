@@ -60,43 +60,43 @@ def read_notebook(data: bytes, name: str) -> LoadedNotebook:
     cells: list[Cell] = []
     markdown: list[int] = []
     responders: list[str] = []
-    for place, raw in enumerate(_collect_raw_cells(document, name), 1):
+    for position, raw in enumerate(_collect_raw_cells(document, name), 1):
         problem = _describe_cell_problem(raw)
         if problem:
             if len(notes) < _MAX_NOTES:
-                notes.append(f"{name}: cell {place} from the top was left out: {problem}.")
+                notes.append(f"{name}: cell {position} from the top was left out: {problem}.")
             continue
         source = _read_source(raw)
         if raw["cell_type"] == "code" and source.strip():
             cells.append(Cell(len(cells) + 1, source, _read_tags(raw)))
         elif raw["cell_type"] != "code" and any(map(is_program_magic, source.split("\n", _MAX_LOOKED_AT))):
-            markdown.append(place)
+            markdown.append(position)
         elif raw["cell_type"] == "raw":
             responders += _RESPONDER.findall(source)
-    found = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MOST_RAW]))
-    return LoadedNotebook(_check_notebook(found), tuple(notes))
+    notebook = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MOST_RAW]))
+    return LoadedNotebook(_check_notebook(notebook), tuple(notes))
 
 
-def _ask_for_code_cell(place: int) -> Sentence:
+def _ask_for_code_cell(position: int) -> Sentence:
     """Return a sentence that asks for a code cell, for a robot program in a Markdown cell."""
     return Sentence(
         "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
-        {"place": place},
+        {"place": position},
     )
 
 
 def describe_near_program(notebook: Notebook) -> str | Sentence:
     """Describe a line that is almost a program's magic, or is one in the wrong place such as a Markdown cell."""
-    for place in notebook.markdown_programs:
-        return Sentence("; %(near)s", {"near": _ask_for_code_cell(place)})
+    for position in notebook.markdown_programs:
+        return Sentence("; %(near)s", {"near": _ask_for_code_cell(position)})
     for cell in notebook.cells:
         for number, line in enumerate(cell.source.split("\n"), 1):
-            begin = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
-            if begin is not None:
+            match = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
+            if match is not None:
                 values = {
                     "line": number,
                     "cell": cell.number,
-                    "word": sanitise_name(begin[0]),
+                    "word": sanitise_name(match[0]),
                     "why": _explain_near_magic(line),
                 }
                 return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
@@ -190,11 +190,11 @@ def _parse_document(text: str, name: str) -> Mapping[str, Any]:
         ) from None
     except ValueError as error:
         line = error.lineno if isinstance(error, JSONDecodeError) else None
-        where = "" if line is None else Sentence(" (line %(line)s)", {"line": line})
+        location = "" if line is None else Sentence(" (line %(line)s)", {"line": line})
         raise UsageError(
             "%(name)s: is not a notebook: its JSON is broken%(where)s, expected one saved by Jupyter.",
             name=name,
-            where=where,
+            where=location,
         ) from None
     if not isinstance(document, dict):
         raise UsageError("%(name)s: is JSON, but not a notebook, expected one saved by Jupyter.", name=name)
@@ -294,10 +294,10 @@ def _parse_cell_magic(line: str) -> str | None:
     """Return the cell of a line ``get_ipython().run_cell_magic('name', 'flags', 'body')``."""
     if not _CELL_MAGIC_CALL.match(line):
         return None
-    words = list(_parse_text_arguments(line))
-    if len(words) != 3:
+    call_arguments = list(_parse_text_arguments(line))
+    if len(call_arguments) != 3:
         return None
-    name, arguments, body = words
+    name, arguments, body = call_arguments
     return f"%%{name} {arguments}".rstrip() + f"\n{body}".rstrip("\n")
 
 

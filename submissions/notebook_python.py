@@ -22,12 +22,12 @@ def extract_python(notebook: Notebook) -> str:
 def _extract_cell_python(source: str) -> str | None:
     """Return the cell with unchanged line positions; None if its magic does not run Python."""
     lines = source.split("\n")
-    above = 0
-    for place, name in list_cell_magics(lines):
+    magic_lines = 0
+    for index, name in list_cell_magics(lines):
         if name not in WRAPPERS:
             return None
-        above = place + 1
-    return "\n".join(["#"] * above + lines[above:])
+        magic_lines = index + 1
+    return "\n".join(["#"] * magic_lines + lines[magic_lines:])
 
 
 def _comment_out_magics(source: str) -> str:
@@ -38,7 +38,7 @@ def _comment_out_line(line: str) -> str:
     """Replace a magic by a comment and a ``pass`` statement, so that its block is not empty."""
     stripped = line.lstrip()
     indent = line[: len(line) - len(stripped)]
-    timed = _RUN_LINE.match(stripped)
-    if timed is not None:
-        return f"{indent}{extract_wrapped_code(timed['rest'])}"
+    timing_match = _RUN_LINE.match(stripped)
+    if timing_match is not None:
+        return f"{indent}{extract_wrapped_code(timing_match['rest'])}"
     return f"{indent}pass  # {stripped}" if stripped.startswith(("%", "!")) else line

@@ -24,6 +24,6 @@ def build_part_use_note(name: str, part: Part) -> str:
 
 def build_missing_part_note(part: Part, files: Mapping[str, bytes]) -> str:
     """Return the note that a part is missing; ``files`` are the other files of the submission."""
-    others = [sanitise_name(name) for name in files if name.lower().endswith(".py")]
-    beside = f" (other files: {', '.join(others[:3])})" if others else ""
-    return f"There is no {PART_FILES[part]}{beside}; criteria that need {PART_WORDS[part]} get no marks."
+    other_files = [sanitise_name(name) for name in files if name.lower().endswith(".py")]
+    other_files_text = f" (other files: {', '.join(other_files[:3])})" if other_files else ""
+    return f"There is no {PART_FILES[part]}{other_files_text}; criteria that need {PART_WORDS[part]} get no marks."

@@ -38,10 +38,10 @@ def read_roster(path: Path) -> list[RosterRow]:
         UsageError: The file as a whole is not a roster.
     """
     table = read_csv(path, {**PERSON_COLUMNS, **{column: (column,) for column in _OWN_COLUMNS}}, _USUAL_COLUMNS)
-    missing = [said for column, said in (("id", "student"), ("file", "file")) if column not in table.columns]
-    if missing:
+    missing_headings = [said for column, said in (("id", "student"), ("file", "file")) if column not in table.columns]
+    if missing_headings:
         raise UsageError(
-            f"{path.name}: has no column {' and no column '.join(missing)} in its first line, expected "
+            f"{path.name}: has no column {' and no column '.join(missing_headings)} in its first line, expected "
             f"{_USUAL_COLUMNS} (assignment may be left out with -a)."
         )
     return [_build_row(row) for row in table.rows]
@@ -54,14 +54,14 @@ def resolve_file(folder: Path, name: str) -> Path:
         UsageError: The path is outside ``folder``.
     """
     parts = PurePosixPath(name.replace("\\", "/")).parts
-    outside = not parts or parts[0] == "/" or ".." in parts or any(part.endswith(":") for part in parts)
+    is_outside = not parts or parts[0] == "/" or ".." in parts or any(part.endswith(":") for part in parts)
     path = folder.joinpath(*parts)
     try:
         # Links in the path could lead outside the folder. The caller that opens the file checks its last part.
-        outside = outside or not path.parent.resolve().is_relative_to(folder.resolve())
+        is_outside = is_outside or not path.parent.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError):
-        outside = True
-    if outside:
+        is_outside = True
+    if is_outside:
         raise UsageError(f"{sanitise_name(name)} is outside the roster's folder, expected a path below it.")
     return path
 
@@ -69,18 +69,18 @@ def resolve_file(folder: Path, name: str) -> Path:
 def _build_row(row: CsvRow) -> RosterRow:
     if row.problem:
         return RosterRow(row.line, problem=row.problem)
-    found = row.cells
-    student = Student(normalise_name(found["id"]), normalise_name(found.get("name", "")), found.get("email", ""))
-    problem = _find_problem(student.id, found["file"])
+    cells = row.cells
+    student = Student(normalise_name(cells["id"]), normalise_name(cells.get("name", "")), cells.get("email", ""))
+    problem = _find_problem(student.id, cells["file"])
     try:
-        submitted_at = parse_time(found["submitted_at"]) if found.get("submitted_at") else None
+        submitted_at = parse_time(cells["submitted_at"]) if cells.get("submitted_at") else None
     except ValueError:
         submitted_at = None
         problem = (
             problem
-            or f"has {sanitise_name(found['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
+            or f"has {sanitise_name(cells['submitted_at'])} for submitted_at, expected a moment like 2026-11-30 17:00."
         )
-    return RosterRow(row.line, student, found["file"], found.get("assignment", ""), problem, submitted_at)
+    return RosterRow(row.line, student, cells["file"], cells.get("assignment", ""), problem, submitted_at)
 
 
 def parse_time(text: str, *, end_of_day: bool = False) -> datetime:
@@ -91,10 +91,10 @@ def parse_time(text: str, *, end_of_day: bool = False) -> datetime:
     Raises:
         ValueError: The text is not a date or time.
     """
-    read = datetime.fromisoformat(text)
+    moment = datetime.fromisoformat(text)
     if end_of_day and len(text.strip()) <= len("2026-11-30"):
-        read += timedelta(days=1, microseconds=-1)
-    return read.astimezone()
+        moment += timedelta(days=1, microseconds=-1)
+    return moment.astimezone()
 
 
 def _find_problem(student: str, file: str) -> str:

@@ -35,9 +35,9 @@ def format_secret_name(secret_sha256: str) -> str:
     return secret_sha256[:8]
 
 
-def compute_world_seed(secret: Secret, named: str) -> int:
+def compute_world_seed(secret: Secret, world_name: str) -> int:
     """Return 63 bits as the seed of the named world, the same for every student of an installation."""
-    return _hash_to_bits(f"{secret.text}{named}")
+    return _hash_to_bits(f"{secret.text}{world_name}")
 
 
 def compute_child_seed(seed: int, submission: str) -> int:

@@ -67,9 +67,9 @@ def decode_source(data: bytes, name: str) -> DecodedText:
             "%(name)s: is a notebook, expected Python source. Rename it so that it ends in .ipynb.", name=name
         )
     decoded = _decode(data, name)
-    nul = decoded.text.find("\0")
-    if nul >= 0:
-        line = decoded.text.count("\n", 0, nul) + 1
+    nul_position = decoded.text.find("\0")
+    if nul_position >= 0:
+        line = decoded.text.count("\n", 0, nul_position) + 1
         raise UsageError(
             "%(name)s: has a NUL character in line %(line)s, expected Python source as plain text.",
             name=name,
@@ -119,17 +119,17 @@ def _find_encoding_cookie(data: bytes) -> str | None:
 
 def find_magic_line(text: str) -> int | None:
     """Return the index of the magic before any code; the last one after wrapper magics. None without a magic."""
-    found = None
-    for place, line in enumerate(text.split("\n")):
+    magic_index = None
+    for index, line in enumerate(text.split("\n")):
         stripped = line.lstrip("\ufeff").strip()
         if not stripped or stripped.startswith("#"):
             continue
         if not stripped.startswith("%"):
-            return found
-        found = place
+            return magic_index
+        magic_index = index
         if not stripped.startswith("%%") or parse_magic_name(stripped) not in WRAPPERS:
-            return place
-    return found
+            return index
+    return magic_index
 
 
 def is_program_magic(line: str) -> bool:
@@ -143,25 +143,25 @@ def parse_magic_name(magic: str) -> str:
     return (magic.split(maxsplit=1) or [""])[0].lstrip("%")
 
 
-def find_modules(text: str, read: Callable[[str], bytes | None]) -> Mapping[str, str]:
+def find_modules(text: str, read_file: Callable[[str], bytes | None]) -> Mapping[str, str]:
     """Return the modules that a text can import, directly or through other modules, by name.
 
-    A text can import only names on its import lines, so rules about code read no other files. ``read`` returns a file's
-    bytes by name, or None. Files that are not text or exceed the common limit are omitted.
+    A text can import only names on its import lines, so rules about code read no other files. ``read_file`` returns a
+    file's bytes by name, or None. Files that are not text or exceed the common limit are omitted.
     """
-    found: dict[str, str] = {}
-    looked: set[str] = set()
-    left = _MOST_TEXT
-    waiting = [text]
-    while waiting:
-        for name in sorted(_find_imported_names(waiting.pop()) - looked):
-            looked.add(name)
-            module = _read_module(name, read)
-            if module is not None and len(module) <= left:
-                left -= len(module)
-                found[name] = module
-                waiting.append(module)
-    return found
+    modules: dict[str, str] = {}
+    checked_names: set[str] = set()
+    remaining_length = _MOST_TEXT
+    pending_texts = [text]
+    while pending_texts:
+        for name in sorted(_find_imported_names(pending_texts.pop()) - checked_names):
+            checked_names.add(name)
+            module = _read_module(name, read_file)
+            if module is not None and len(module) <= remaining_length:
+                remaining_length -= len(module)
+                modules[name] = module
+                pending_texts.append(module)
+    return modules
 
 
 def _find_imported_names(text: str) -> set[str]:
@@ -169,8 +169,8 @@ def _find_imported_names(text: str) -> set[str]:
     return {name for line in lines for name in _WORD.findall(line)}
 
 
-def _read_module(name: str, read: Callable[[str], bytes | None]) -> str | None:
-    data = read(f"{name}.py")
+def _read_module(name: str, read_file: Callable[[str], bytes | None]) -> str | None:
+    data = read_file(f"{name}.py")
     if data is None:
         return None
     try:

@@ -70,8 +70,8 @@ def unpack_submission(data: bytes) -> Submission:
         sources[part] = None if text is None else SourceFile(str(name), text.decode("utf-8", "surrogatepass"))
     notebook = None
     if isinstance(meta.get("notebook"), str) and _PACKED_NOTEBOOK in files:
-        packed = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
-        notebook = dataclasses.replace(packed, name=str(meta["notebook"]))
+        packed_notebook = read_notebook(files.pop(_PACKED_NOTEBOOK), _PACKED_NOTEBOOK).notebook
+        notebook = dataclasses.replace(packed_notebook, name=str(meta["notebook"]))
     notes = meta.get("notes", [])
     assignment = meta.get("assignment")
     return Submission(

@@ -73,34 +73,40 @@ class People:
     by_number: Mapping[str, Student]  # Moodle's number of a person in one assignment
     by_name: Mapping[str, tuple[Student, ...]]
 
-    def find(self, written: Student, number: str = "") -> Student:
+    def find(self, stated_student: Student, number: str = "") -> Student:
         """Return the person with this identity, optionally by a number from another system.
 
         Raises:
             UsageError: No person matches, or several do.
         """
-        whole = {_normalise_key(each): each for each in (written.id, written.email, written.name) if each}
-        known = self.by_number.get(number)
-        if known is not None:
-            if written.name in ("", HIDDEN_NAME) or _normalise_key(written.name).endswith(_normalise_key(known.name)):
-                return known
+        full_names = {
+            _normalise_key(each): each
+            for each in (stated_student.id, stated_student.email, stated_student.name)
+            if each
+        }
+        numbered_student = self.by_number.get(number)
+        if numbered_student is not None:
+            if stated_student.name in ("", HIDDEN_NAME) or _normalise_key(stated_student.name).endswith(
+                _normalise_key(numbered_student.name)
+            ):
+                return numbered_student
             raise UsageError(
-                f"{self.file} has {sanitise_name(known.name)} as Participant {number}, not "
-                f"{sanitise_name(written.name)}; expected "
+                f"{self.file} has {sanitise_name(numbered_student.name)} as Participant {number}, not "
+                f"{sanitise_name(stated_student.name)}; expected "
                 "the table of this assignment."
             )
         # With group submissions, Moodle puts the group before the name: Group 1-Ada.
-        for key in (*whole, *(key.partition("-")[2] for key in whole)):
-            found = self.by_name.get(key, ())
-            if len(found) == 1:
-                return found[0]
-            if found:
+        for key in (*full_names, *(key.partition("-")[2] for key in full_names)):
+            candidates = self.by_name.get(key, ())
+            if len(candidates) == 1:
+                return candidates[0]
+            if candidates:
                 raise UsageError(
-                    f"{len(found)} people in {self.file} are called {sanitise_name(whole.get(key, key))}, "
+                    f"{len(candidates)} people in {self.file} are called {sanitise_name(full_names.get(key, key))}, "
                     "expected a table "
                     "that distinguishes them by the Identifier of Moodle's worksheet, or by id."
                 )
-        name = written.name or written.id
+        name = stated_student.name or stated_student.id
         hint = suggest_name(name, {each.name or each.id for several in self.by_name.values() for each in several})
         raise UsageError(f"{sanitise_name(name)} is not in {self.file}, expected one of its people{hint or '.'}")
 
@@ -119,13 +125,13 @@ def read_people(path: Path) -> People:
             f"{path.name}: has {len(table.rows)} people, expected at most {MAX_PEOPLE}; split it into several tables."
         )
     numbers: dict[str, Student] = {}
-    called: dict[str, list[Student]] = {}
+    students_by_name: dict[str, list[Student]] = {}
     for row, student in _read_students(table.rows, path.name):
         if number := re.search(r"\d+$", row.cells.get("identifier", "")):
             numbers[number[0]] = student
         for key in {_normalise_key(each) for each in (student.id, student.email, student.name) if each}:
-            called.setdefault(key, []).append(student)
-    return People(path.name, numbers, {key: tuple(several) for key, several in called.items()})
+            students_by_name.setdefault(key, []).append(student)
+    return People(path.name, numbers, {key: tuple(several) for key, several in students_by_name.items()})
 
 
 def list_known_students(people: People) -> list[Student]:
@@ -147,25 +153,26 @@ def _read_students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, 
             raise UsageError(f"{file}: line {row.line} {row.problem}")
     names = [normalise_name(row.cells.get("name", "")) or _join_names(row) for row in rows]
     emails = [row.cells.get("email", "") for row in rows]
-    others = [
+    suffixes = [
         emails[place] or re.sub(r"\D", "", row.cells.get("identifier", "")) or f"line {row.line}"
         for place, row in enumerate(rows)
     ]
-    usual = make_unique_ids(zip(names, others, strict=True))
-    ids = [row.cells.get("id") or usual[place] or emails[place] for place, row in enumerate(rows)]
+    generated_ids = make_unique_ids(zip(names, suffixes, strict=True))
+    ids = [row.cells.get("id") or generated_ids[place] or emails[place] for place, row in enumerate(rows)]
     lines: dict[str, list[str]] = {}
-    for row, own in zip(rows, ids, strict=True):
-        lines.setdefault(_normalise_key(own), []).append(str(row.line))
-    for row, own, name, email in zip(rows, ids, names, emails, strict=True):
-        if not own:
+    for row, student_id in zip(rows, ids, strict=True):
+        lines.setdefault(_normalise_key(student_id), []).append(str(row.line))
+    for row, student_id, name, email in zip(rows, ids, names, emails, strict=True):
+        if not student_id:
             raise UsageError(f"{file}: line {row.line} has no id, name or e-mail address, expected one of them.")
-        if len(lines[_normalise_key(own)]) > 1:
+        if len(lines[_normalise_key(student_id)]) > 1:
             raise UsageError(
-                f"{file}: lines {' and '.join(lines[_normalise_key(own)][:5])}: {sanitise_name(own)} is the id of "
+                f"{file}: lines {' and '.join(lines[_normalise_key(student_id)][:5])}: "
+                f"{sanitise_name(student_id)} is the id of "
                 "several students, "
                 "expected a different id for each."
             )
-        yield row, Student(own, name, email)
+        yield row, Student(student_id, name, email)
 
 
 def _join_names(row: CsvRow) -> str:

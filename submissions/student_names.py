@@ -29,8 +29,10 @@ def normalise_name(text: str) -> str:
 
     The name is never used as a path, so it may contain slashes.
     """
-    kept = "".join(" " if c.isspace() else c for c in text if c.isspace() or c in _JOINERS or not _is_control(c))
-    name = " ".join(unicodedata.normalize("NFC", kept).split()).strip(" " + _JOINERS)
+    visible_text = "".join(
+        " " if c.isspace() else c for c in text if c.isspace() or c in _JOINERS or not _is_control(c)
+    )
+    name = " ".join(unicodedata.normalize("NFC", visible_text).split()).strip(" " + _JOINERS)
     return name if any(compute_name_forms(name)) else ""
 
 
@@ -45,31 +47,31 @@ def compute_name_forms(name: str) -> frozenset[str]:
     if name.isascii() and name.isprintable():
         return frozenset([_fold_text(name)])
     letters = (" " if c.isspace() or c in _BLANKS else c for c in unicodedata.normalize("NFKD", name))
-    seen = "".join(c for c in letters if c not in _INVISIBLE and not _is_control(c))
-    return frozenset([_fold_text(seen), _fold_text(seen.translate(_load_look_alikes()))])
+    visible_text = "".join(c for c in letters if c not in _INVISIBLE and not _is_control(c))
+    return frozenset([_fold_text(visible_text), _fold_text(visible_text.translate(_load_look_alikes()))])
 
 
 def find_look_alikes(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the names that look like another name, each with some of the others."""
     by_form: dict[str, list[str]] = {}
-    different = list(dict.fromkeys(names))
-    for name in different:
+    distinct_names = list(dict.fromkeys(names))
+    for name in distinct_names:
         for form in compute_name_forms(name):
             by_form.setdefault(form, []).append(name)
-    found = {}
-    for name in different:
-        near = dict.fromkeys(
+    look_alikes = {}
+    for name in distinct_names:
+        similar_names = dict.fromkeys(
             other for form in sorted(compute_name_forms(name)) for other in by_form[form][:4] if other != name
         )
-        if near:
-            found[name] = tuple(near)[:3]
-    return found
+        if similar_names:
+            look_alikes[name] = tuple(similar_names)[:3]
+    return look_alikes
 
 
-def describe_look_alikes(others: Sequence[str]) -> str:
+def describe_look_alikes(similar_names: Sequence[str]) -> str:
     """Return ``cannot be told from x`` with the reason."""
-    listed = " and ".join(f'"{sanitise_name(other)}"' for other in others)
-    return f"cannot be distinguished from {listed} (case, spaces, and invisible or similar letters do not count)"
+    quoted_names = " and ".join(f'"{sanitise_name(other)}"' for other in similar_names)
+    return f"cannot be distinguished from {quoted_names} (case, spaces, and invisible or similar letters do not count)"
 
 
 def _fold_text(text: str) -> str:

@@ -68,12 +68,12 @@ class Submission:
     @cached_property
     def python_files(self) -> Mapping[str, SourceFile]:
         """The readable Python files among ``files`` by name: modules, agents, the second robot's program."""
-        found: dict[str, SourceFile] = {}
+        sources: dict[str, SourceFile] = {}
         for name, data in self.files.items():
             if name.lower().endswith(".py"):
                 with contextlib.suppress(UsageError):
-                    found[name] = _decode_file(name, data)
-        return MappingProxyType(found)
+                    sources[name] = _decode_file(name, data)
+        return MappingProxyType(sources)
 
     def find_code(self, name: str) -> SourceFile | None:
         """Return the file with this name among ``files``, or None.
@@ -143,20 +143,20 @@ def _decode_file(name: str, data: bytes) -> SourceFile:
     return SourceFile(name, decode_source(data, sanitise_name(name)).text)
 
 
-def read_meta(data: bytes, where: str) -> dict[str, object]:
+def read_meta(data: bytes, source_name: str) -> dict[str, object]:
     """Parse submission.toml; an empty file gives no entries.
 
     Raises:
-        UsageError: The file cannot be read. The message has ``where``.
+        UsageError: The file cannot be read. The message has ``source_name``.
     """
     if not data:
         return {}
     if len(data) > _MOST_META_BYTES:
-        raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=where, file=META_FILE)
-    return parse_meta(data, where)
+        raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=source_name, file=META_FILE)
+    return parse_meta(data, source_name)
 
 
-def parse_meta(data: bytes, where: str) -> dict[str, object]:
+def parse_meta(data: bytes, source_name: str) -> dict[str, object]:
     """Parse submission.toml without a limit on its size, for stored files with many notes."""
     try:
         return read_toml(data.decode("utf-8-sig"))
@@ -164,13 +164,13 @@ def parse_meta(data: bytes, where: str) -> dict[str, object]:
         problem = error.message if isinstance(error, UnreadableDataError) else str(error)[:200]
         raise UsageError(
             '%(where)s: %(file)s cannot be read (%(problem)s), expected lines like assignment = "echo-responder".',
-            where=where,
+            where=source_name,
             file=META_FILE,
             problem=problem,
         ) from None
 
 
-def get_meta_text(meta: Mapping[str, object], key: str, where: str) -> str | None:
+def get_meta_text(meta: Mapping[str, object], key: str, source_name: str) -> str | None:
     """Return a text of the file, or None if it is missing.
 
     Raises:
@@ -180,16 +180,16 @@ def get_meta_text(meta: Mapping[str, object], key: str, where: str) -> str | Non
     if value is not None and (not isinstance(value, str) or not value.strip()):
         raise UsageError(
             '%(where)s: %(key)s in %(file)s is not a text, expected %(key)s = "..." there.',
-            where=where,
+            where=source_name,
             key=key,
             file=META_FILE,
         )
     return value
 
 
-def get_meta_run(meta: Mapping[str, object], where: str) -> str | None:
+def get_meta_run(meta: Mapping[str, object], source_name: str) -> str | None:
     """Return the run of a notebook that is to be marked: a number, or the tag of a cell."""
     value = meta.get("run")
     if isinstance(value, int) and not isinstance(value, bool):
         return str(value)
-    return get_meta_text(meta, "run", where)
+    return get_meta_text(meta, "run", source_name)

@@ -8,14 +8,14 @@ from collections.abc import Iterable
 _LONGEST = 100
 
 
-def suggest_name(name: str, known: Iterable[str]) -> str:
+def suggest_name(name: str, known_names: Iterable[str]) -> str:
     """Return ``; did you mean "x"?`` for a similar name, otherwise an empty text."""
     # The time is proportional to the product of the lengths.
     if len(name) > _LONGEST:
         return ""
-    by_lower = {k.lower(): k for k in known}
-    near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
-    return f'; did you mean "{by_lower[near[0]]}"?' if near else ""
+    by_lower = {k.lower(): k for k in known_names}
+    matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
+    return f'; did you mean "{by_lower[matches[0]]}"?' if matches else ""
 
 
 def join_with_or(names: Iterable[str]) -> str:

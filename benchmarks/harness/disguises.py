@@ -50,17 +50,17 @@ def rewrite_expressions(source: str) -> str:
 def extract_functions(source: str) -> str:
     """Return the source with loop bodies, first halves of functions, and remaining code moved to functions."""
     tree = ast.parse(source)
-    defined = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom | ast.FunctionDef)]
-    rest = [node for node in tree.body if node not in defined]
+    definitions = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom | ast.FunctionDef)]
+    other_statements = [node for node in tree.body if node not in definitions]
     functions: list[ast.stmt] = []
-    for node in [*defined, *rest]:
+    for node in [*definitions, *other_statements]:
         if isinstance(node, ast.While | ast.For) or (isinstance(node, ast.FunctionDef) and len(node.body) > 3):
-            taken = len(node.body) if not isinstance(node, ast.FunctionDef) else len(node.body) // 2
+            moved_count = len(node.body) if not isinstance(node, ast.FunctionDef) else len(node.body) // 2
             name = f"step_{len(functions)}"
-            functions.append(_build_function(name, node.body[:taken]))
-            node.body[:taken] = ast.parse(f"result = {name}()").body
-    main = [_build_function("main", rest), *ast.parse("main()").body] if rest else []
-    return ast.unparse(ast.fix_missing_locations(ast.Module([*functions, *defined, *main], [])))
+            functions.append(_build_function(name, node.body[:moved_count]))
+            node.body[:moved_count] = ast.parse(f"result = {name}()").body
+    main = [_build_function("main", other_statements), *ast.parse("main()").body] if other_statements else []
+    return ast.unparse(ast.fix_missing_locations(ast.Module([*functions, *definitions, *main], [])))
 
 
 def apply_all(source: str) -> str:
@@ -72,8 +72,8 @@ def _keep_magic(copyist: Callable[[str], str]) -> Callable[[str], str]:
     def copy(source: str) -> str:
         if not source.startswith("%"):
             return copyist(source)
-        magic, _, rest = source.partition("\n")
-        return f"{magic}\n{copyist(rest)}"
+        magic, _, body = source.partition("\n")
+        return f"{magic}\n{copyist(body)}"
 
     return copy
 
@@ -104,8 +104,8 @@ class _ExpressionRewriter(ast.NodeTransformer):
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
-        both = (node.left, node.right)
-        if any(isinstance(each, ast.JoinedStr | ast.Constant) and not _is_number(each) for each in both):
+        operands = (node.left, node.right)
+        if any(isinstance(each, ast.JoinedStr | ast.Constant) and not _is_number(each) for each in operands):
             return node
         if isinstance(node.op, ast.Mult):
             return ast.BinOp(node.right, node.op, node.left)
@@ -115,10 +115,10 @@ class _ExpressionRewriter(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         self.generic_visit(node)
-        turned = self._TURNED.get(type(node.ops[0]))
-        if turned is None or len(node.ops) > 1:
+        mirrored_operator = self._TURNED.get(type(node.ops[0]))
+        if mirrored_operator is None or len(node.ops) > 1:
             return node
-        return ast.Compare(node.comparators[0], [turned()], [node.left])
+        return ast.Compare(node.comparators[0], [mirrored_operator()], [node.left])
 
 
 def _is_number(node: ast.expr) -> bool:
@@ -160,6 +160,6 @@ def _remove_docstrings(tree: ast.Module) -> ast.Module:
 
 
 def _build_function(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
-    made = cast(ast.FunctionDef, ast.parse(f"def {name}():\n    pass").body[0])
-    made.body = body
-    return made
+    function = cast(ast.FunctionDef, ast.parse(f"def {name}():\n    pass").body[0])
+    function.body = body
+    return function

@@ -93,8 +93,8 @@ def _build_request(student: str, program: str) -> GradingRequest:
 def compute_expected_hashes() -> list[tuple[str, ...]]:
     """Return the hash chains of the trials of each variant, from a run without a queue."""
     with TrialRunner() as runner:
-        graded = [grade(each.submission, each.assignment, runner=runner) for each in build_requests(_VARIANTS)]
-    return [tuple(trial.recording.sha256 for trial in each.trials) for each in graded]
+        grades = [grade(each.submission, each.assignment, runner=runner) for each in build_requests(_VARIANTS)]
+    return [tuple(trial.recording.sha256 for trial in each.trials) for each in grades]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,16 +148,16 @@ class FaultInjector:
             self._broker.ensure()
         if self._server is not None:
             self._server.ensure()
-        for place, worker in enumerate(self._workers):
+        for position, worker in enumerate(self._workers):
             if worker is None or worker.poll() is not None:
-                self._workers[place] = self._start_worker(place)
-        still = []
-        for until, pids in self._frozen:
-            if time.monotonic() >= until:
+                self._workers[position] = self._start_worker(position)
+        still_frozen = []
+        for resume_at, pids in self._frozen:
+            if time.monotonic() >= resume_at:
                 _send_signal(pids, signal.SIGCONT)
             else:
-                still.append((until, pids))
-        self._frozen = still
+                still_frozen.append((resume_at, pids))
+        self._frozen = still_frozen
 
     def stop(self) -> None:
         """Stop all processes."""
@@ -178,23 +178,25 @@ class FaultInjector:
             "clock set back": lambda: self._step_clock(-_STEP),
         }
         if self._server is None:
-            own = {"database locked": self._lock_database}
+            database_faults = {"database locked": self._lock_database}
         else:
-            own = {"database ended": self._end_database, "database killed": self._kill_database}
-        full = {"disk full": self._fill_disk} if self._disk is not None else {"no file may grow": self._forbid_growth}
-        return common | own | full
+            database_faults = {"database ended": self._end_database, "database killed": self._kill_database}
+        disk_faults = (
+            {"disk full": self._fill_disk} if self._disk is not None else {"no file may grow": self._forbid_growth}
+        )
+        return common | database_faults | disk_faults
 
     def inject_fault(self, name: str) -> None:
         """Inject the fault with this name."""
         self.list_faults()[name]()
         self.done[name] += 1
 
-    def _start_worker(self, place: int) -> subprocess.Popen[bytes]:
+    def _start_worker(self, position: int) -> subprocess.Popen[bytes]:
         environment = {**self.settings.to_environment(), WORKER_VARIABLE: create_worker_name()}
-        if place == 0 and self._server is not None:
+        if position == 0 and self._server is not None:
             # With many machines, one of them has a wrong clock.
             environment["PYTHONPATH"] = str(_WRONG_CLOCK)
-        log = self._home / "log" / f"worker-{place}.log"
+        log = self._home / "log" / f"worker-{position}.log"
         return start_process(build_python_command("-m", "service.queue.worker"), environment, log, signal.SIGKILL)
 
     def _choose_worker(self) -> int | None:
@@ -291,7 +293,7 @@ class Campaign:
     patience_seconds: float = 300.0
     tell: Callable[[str], None] = field(default=lambda _: None)
 
-    def run(self, injector: FaultInjector, quiet: Sequence[tuple[str, ...]]) -> CampaignResults:
+    def run(self, injector: FaultInjector, expected_hashes: Sequence[tuple[str, ...]]) -> CampaignResults:
         """Submit, inject faults until all jobs have ended, and return the results."""
         chance = random.Random(self.seed)
         names = list(injector.list_faults())
@@ -300,21 +302,21 @@ class Campaign:
         Notifier(make_celery(injector.settings), injector.store, injector.settings).grade(
             JobQueue.BATCH, self.grading_requests
         )
-        begun = time.monotonic()
-        next_at = begun
-        coming: list[str] = []
-        while (left := _count_unfinished_jobs(injector.store, batch)) != 0:
+        start = time.monotonic()
+        next_at = start
+        pending_faults: list[str] = []
+        while (remaining := _count_unfinished_jobs(injector.store, batch)) != 0:
             injector.ensure()
             moment = time.monotonic()
-            assert moment - begun < self.patience_seconds, f"{left} have not ended after {moment - begun:.0f} s"
-            if moment >= next_at and left is not None and _has_begun(injector.store, batch):
-                coming = coming or chance.sample(names, len(names))
-                name = coming.pop()
-                self.tell(f"{moment - begun:4.0f} s, {left:4} left: {name}")
+            assert moment - start < self.patience_seconds, f"{remaining} have not ended after {moment - start:.0f} s"
+            if moment >= next_at and remaining is not None and _has_begun(injector.store, batch):
+                pending_faults = pending_faults or chance.sample(names, len(names))
+                name = pending_faults.pop()
+                self.tell(f"{moment - start:4.0f} s, {remaining:4} left: {name}")
                 injector.inject_fault(name)
                 next_at = time.monotonic() + chance.uniform(*self.pause)
             time.sleep(0.1)
-        return _collect_results(injector, batch, quiet, time.monotonic() - begun)
+        return _collect_results(injector, batch, expected_hashes, time.monotonic() - start)
 
 
 @contextmanager
@@ -322,37 +324,41 @@ def small_disk(folder: Path, megabytes: int) -> Iterator[Path | None]:
     """Yield a small file system at ``folder``, or None if it can't be mounted. The folder is removed at the end."""
     folder.mkdir(exist_ok=True)
     mount = ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m,mode=755", "robomark", str(folder)]
-    mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
+    is_mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
     try:
-        yield folder if mounted else None
+        yield folder if is_mounted else None
     finally:
-        if mounted:
+        if is_mounted:
             subprocess.run(["umount", "--lazy", str(folder)], capture_output=True, check=False)
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _collect_results(
-    injector: FaultInjector, batch: str, quiet: Sequence[tuple[str, ...]], seconds: float
+    injector: FaultInjector, batch: str, expected_hashes: Sequence[tuple[str, ...]], seconds: float
 ) -> CampaignResults:
     with injector.store.reading() as session:
         jobs = session.scalars(select(Job).where(Job.batch_id == batch).order_by(Job.queued_at, Job.id)).all()
-        doubled = differing = 0
+        duplicate_count = different_count = 0
         criteria = len(load_grading_request(session, jobs[0].id).assignment.criteria)
         for job in jobs:
             if job.state is not JobState.DONE:
                 continue
-            variant = int(load_grading_request(session, job.id).submission.student.partition("-")[2]) % len(quiet)
+            variant = int(load_grading_request(session, job.id).submission.student.partition("-")[2]) % len(
+                expected_hashes
+            )
             trials = session.scalars(
                 select(TrialRow).where(TrialRow.job_id == job.id).order_by(TrialRow.position)
             ).all()
-            marked = select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
-            doubled += (len(trials), session.scalar(marked)) != (len(quiet[variant]), criteria)
-            differing += tuple(trial.sha256 for trial in trials) != quiet[variant]
+            result_count = (
+                select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.job_id == job.id)
+            )
+            duplicate_count += (len(trials), session.scalar(result_count)) != (len(expected_hashes[variant]), criteria)
+            different_count += tuple(trial.sha256 for trial in trials) != expected_hashes[variant]
         return CampaignResults(
             states=Counter(job.state for job in jobs),
             errors=[job.error or "" for job in jobs if job.state is not JobState.DONE],
-            duplicated=doubled,
-            differing=differing,
+            duplicated=duplicate_count,
+            differing=different_count,
             most_attempts=max(job.attempt for job in jobs),
             seconds=seconds,
             injected=dict(injector.done),

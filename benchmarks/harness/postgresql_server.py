@@ -44,19 +44,19 @@ class PostgresqlServer:
         """Send a signal: SIGINT stops it in order, SIGQUIT at once, SIGKILL only the main process."""
         pid = self.pid
         os.kill(pid, number)
-        until = time.monotonic() + _PATIENCE
-        while Path(f"/proc/{pid}").exists() and time.monotonic() < until:
+        deadline = time.monotonic() + _PATIENCE
+        while Path(f"/proc/{pid}").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
 
     def ensure(self) -> None:
         """Start the server unless it accepts connections."""
-        until = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + _PATIENCE
         while not self.answers():
             try:
                 self._server.ensure_postgres_running()
             except (subprocess.SubprocessError, AssertionError, OSError, ValueError):
                 # Processes of the previous server may still be running.
-                if time.monotonic() > until:
+                if time.monotonic() > deadline:
                     raise
             time.sleep(0.2)
 

@@ -77,8 +77,8 @@ def render_digit(digit: Digits, paper: int, dx: int, dy: int) -> Grey:
 
 def render_inked_digit(digit: Digits, ink: int, dx: int, dy: int) -> Grey:
     """Return the grey focus over the digit printed in ``ink`` (0 black to 255 white) on white paper."""
-    covered = render_digit(digit, _BLACK, dx, dy).astype(np.int64)
-    return np.asarray(_WHITE - (covered * (_WHITE - ink) + _WHITE // 2) // _WHITE, np.uint8)
+    coverage = render_digit(digit, _BLACK, dx, dy).astype(np.int64)
+    return np.asarray(_WHITE - (coverage * (_WHITE - ink) + _WHITE // 2) // _WHITE, np.uint8)
 
 
 def list_digit_poses(background: str, sheet: int) -> tuple[LabelledPose, ...]:
@@ -86,11 +86,11 @@ def list_digit_poses(background: str, sheet: int) -> tuple[LabelledPose, ...]:
 
     The robot faces up with its left sensor over the digit.
     """
-    shown = [int(label.label) for label in build_floor(background, seed=sheet).labels]
+    digits = [int(label.label) for label in build_floor(background, seed=sheet).labels]
     spots = [divmod(number, COLUMNS) for number in range(COLUMNS * ROWS)]
     return tuple(
         LabelledPose(background, sheet, Pose(100 + PITCH * column, 1050 - PITCH * row, 90), digit)
-        for digit, (row, column) in zip(shown, spots, strict=True)
+        for digit, (row, column) in zip(digits, spots, strict=True)
     )
 
 
@@ -113,11 +113,11 @@ def _build_example(digit: Digits, round_: int, number: int) -> Grey:
     dx = dy = 0
     if chance.uniform(round_, 1) >= _ON_THE_SPOT:
         dx, dy = (chance.integer(round_, index) % (2 * _REACH + 1) - _REACH for index in (2, 3))
-    bent = _distort_digit(digit, chance, round_)
+    distorted_digit = _distort_digit(digit, chance, round_)
     if chance.uniform(round_, 10) < _DARK_INK:
-        grey = render_inked_digit(bent, chance.integer(round_, 11) % (_PALEST_INK + 1), dx, dy)
+        grey = render_inked_digit(distorted_digit, chance.integer(round_, 11) % (_PALEST_INK + 1), dx, dy)
     else:
-        grey = render_digit(bent, paper, dx, dy)
+        grey = render_digit(distorted_digit, paper, dx, dy)
     noise = _NOISES[chance.integer(round_, 4) % len(_NOISES)]
     return add_noise(grey, noise, RandomStream(_SEED, f"noise {number}"), round_) if noise else grey
 
@@ -138,24 +138,26 @@ def _distort_digit(digit: Digits, chance: RandomStream, round_: int) -> Digits:
 
 
 def _render_in_dark_ink(grey: float) -> Iterator[tuple[int, Grey]]:
-    images, shown = load_sheet_digits()
-    for image, digit in zip(images, shown, strict=True):
+    images, digits = load_sheet_digits()
+    for image, digit in zip(images, digits, strict=True):
         yield int(digit), render_inked_digit(image, int(grey), 0, 0)
 
 
 def _build_test() -> ClassifierTest:
     sheets = [(background, sheet) for background, numbers in _SHEETS for sheet in numbers]
-    whole = tuple(place for background, sheet in sheets for place in list_digit_poses(background, sheet))
-    words = "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
-    words += "the sheets show only the last 100 of each digit, which no training image comes from"
-    dark = AlterationTest(
+    poses = tuple(place for background, sheet in sheets for place in list_digit_poses(background, sheet))
+    description = (
+        "all 220 digits of six sheets, three on white and three on black paper, where the course stands the robot; "
+    )
+    description += "the sheets show only the last 100 of each digit, which no training image comes from"
+    dark_ink_test = AlterationTest(
         "grey of dark ink",
         "of 255",
         "each of those 1000 digits on white paper, on the spot",
         _INKS,
         _render_in_dark_ink,
     )
-    return ClassifierTest(whole, ((0, 1),), whole, (0,), 1, words, (dark,))
+    return ClassifierTest(poses, ((0, 1),), poses, (0,), 1, description, (dark_ink_test,))
 
 
 def _register(name: str, file: str, side: int, rounds: int, plan: NetworkTrainer) -> None:

@@ -68,10 +68,10 @@ def render_altered_shape(code: int, alteration: Alteration) -> Grey:
     middle = _MARGIN + SIDE / 2
     # Inverse mapping from output to input pixels. It keeps the centre, apart from the move.
     inverse = (cosine, -sine, middle - cosine * x + sine * y, sine, cosine, middle - sine * x - cosine * y)
-    turned = Image.fromarray(shape).transform(
+    rotated_image = Image.fromarray(shape).transform(
         (SIDE, SIDE), Image.Transform.AFFINE, inverse, alteration.resampling, fillcolor=_WHITE
     )
-    grey = alteration.ink + np.asarray(turned, np.int64) * (_WHITE - alteration.ink) // _WHITE
+    grey = alteration.ink + np.asarray(rotated_image, np.int64) * (_WHITE - alteration.ink) // _WHITE
     if alteration.cover is not None:
         left, top, width, height, colour = alteration.cover
         grey[top : top + height, left : left + width] = colour
@@ -88,11 +88,13 @@ def _render_printed_shapes() -> tuple[Grey, ...]:
 def _build_examples() -> Examples:
     """Return the training images: the course's floor ``_ROUNDS`` times, then altered shapes."""
     images, labels = _build_floor_examples()
-    own = [(code, _build_altered_example(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)]
-    rows = np.array([compute_features(grey) for _, grey in own])
+    altered_shapes = [
+        (code, _build_altered_example(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)
+    ]
+    rows = np.array([compute_features(grey) for _, grey in altered_shapes])
     return (
         np.concatenate([images] * _ROUNDS + [rows]),
-        np.concatenate([labels] * _ROUNDS + [np.array([code for code, _ in own], np.int64)]),
+        np.concatenate([labels] * _ROUNDS + [np.array([code for code, _ in altered_shapes], np.int64)]),
     )
 
 
@@ -125,7 +127,7 @@ def _build_altered_example(code: int, number: int) -> Grey:
         turn, smallest, largest, reach = 13.0, 0.55, 1.3, 2.0
     else:
         turn, smallest, largest, reach = 0.0, 1.0, 1.0, 3.0
-    covered = kind >= 0.75 or chance.uniform(number, 1) < 0.35
+    has_cover = kind >= 0.75 or chance.uniform(number, 1) < 0.35
     grey = render_altered_shape(
         code,
         Alteration(
@@ -135,7 +137,7 @@ def _build_altered_example(code: int, number: int) -> Grey:
             y=chance.between(-reach, reach, number, 5),
             ink=chance.integer(number, 6) % _PALEST if chance.uniform(number, 7) < 0.3 else _BLACK,
             resampling=_RESAMPLINGS[chance.integer(number, 8) % len(_RESAMPLINGS)],
-            cover=_choose_cover(chance, number) if covered else None,
+            cover=_choose_cover(chance, number) if has_cover else None,
         ),
     )
     noise = _OWN_NOISES[chance.integer(number, 9) % len(_OWN_NOISES)]
@@ -169,17 +171,21 @@ def _render_covered_shapes(side: float) -> Iterator[tuple[int, Grey]]:
             yield code, render_altered_shape(code, Alteration(cover=(left, top, width, width, colour)))
 
 
-def _render_alterations(ways: Callable[[Image.Resampling], Sequence[Alteration]]) -> Iterator[tuple[int, Grey]]:
+def _render_alterations(
+    build_alterations: Callable[[Image.Resampling], Sequence[Alteration]],
+) -> Iterator[tuple[int, Grey]]:
     for code in range(len(SHAPES)):
         for resampling in (Image.Resampling.NEAREST, Image.Resampling.BILINEAR):
-            for alteration in ways(resampling):
+            for alteration in build_alterations(resampling):
                 yield code, render_altered_shape(code, alteration)
 
 
 def _build_test() -> ClassifierTest:
     noises = ((0, 1), (10, 20), (32, 20), (64, 20), (128, 20))
-    words = "the six shapes where the course stands the robot, without noise once, with light noise 10, 32, 64 and 128 "
-    words += "twenty times each"
+    description = (
+        "the six shapes where the course stands the robot, without noise once, with light noise 10, 32, 64 and 128 "
+    )
+    description += "twenty times each"
     curves = (
         AlterationTest("turned image", "degrees", "about the window's middle", _TURNS, _render_turned_shapes),
         AlterationTest("size of the image", "%", "on the spot and 1 mm beside", _SIZES, _render_scaled_shapes),
@@ -187,7 +193,7 @@ def _build_test() -> ClassifierTest:
             "covered square", "mm each way", "black, grey or white, wherever it is", _COVERS, _render_covered_shapes
         ),
     )
-    return ClassifierTest(list_shape_poses(), noises, list_shape_poses(), (0, 32), 20, words, curves)
+    return ClassifierTest(list_shape_poses(), noises, list_shape_poses(), (0, 32), 20, description, curves)
 
 
 TASK = register(

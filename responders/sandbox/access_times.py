@@ -19,13 +19,13 @@ _FRESH_SECONDS = 11 * 3600
 _NO_ACCESS_TIMES = os.ST_RDONLY | os.ST_NOATIME
 
 
-def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | None:
-    """Read ``paths`` and everything below, list ``listed``, and follow the links to them.
+def read_beforehand(paths: Iterable[str], listed_paths: Iterable[str] = ()) -> str | None:
+    """Read ``paths`` and everything below, list ``listed_paths``, and follow the links to them.
 
     Return a sentence about a file whose access time would still change, or None.
     """
-    alone = _add_links(listed)
-    pending: list[tuple[str, int | None]] = [(path, None) for path in _add_links(paths) | alone]
+    shallow_paths = _add_links(listed_paths)
+    pending: list[tuple[str, int | None]] = [(path, None) for path in _add_links(paths) | shallow_paths]
     while pending:
         path, rule = pending.pop()
         # Files may disappear, or be unreadable. Children can't read those either.
@@ -42,22 +42,22 @@ def read_beforehand(paths: Iterable[str], listed: Iterable[str] = ()) -> str | N
                 return f"each reading of {path} is dated: it is mounted with neither relatime nor noatime"
             if not rule & _NO_ACCESS_TIMES and _is_updated_again(path, status):
                 return f"each reading of {path} is dated: its last change is dated in the future"
-            if stat.S_ISDIR(mode) and path not in alone:
+            if stat.S_ISDIR(mode) and path not in shallow_paths:
                 pending += [(entry.path, rule) for entry in os.scandir(path)]
     return None
 
 
 def _add_links(paths: Iterable[str]) -> set[str]:
     """Return the paths, the targets of links, and the links on the way."""
-    found = {each for path in paths for each in (path, os.path.realpath(path))}
-    return found | {str(above) for path in found for above in Path(path).parents if above.is_symlink()}
+    targets = {each for path in paths for each in (path, os.path.realpath(path))}
+    return targets | {str(above) for path in targets for above in Path(path).parents if above.is_symlink()}
 
 
-def _is_updated_again(path: str, before: os.stat_result) -> bool:
+def _is_updated_again(path: str, status: os.stat_result) -> bool:
     """Read the path if that would update its access time. Return whether the next read would update it too."""
-    if not _is_due(before):
+    if not _is_due(status):
         return False
-    mode = before.st_mode
+    mode = status.st_mode
     if stat.S_ISLNK(mode):
         Path(path).readlink()
     elif stat.S_ISDIR(mode):
@@ -66,11 +66,11 @@ def _is_updated_again(path: str, before: os.stat_result) -> bool:
     elif stat.S_ISREG(mode):
         with Path(path).open("rb", buffering=0) as file:
             file.read(1)
-    after = os.lstat(path)
-    return _is_due(after) and after.st_atime_ns != before.st_atime_ns
+    new_status = os.lstat(path)
+    return _is_due(new_status) and new_status.st_atime_ns != status.st_atime_ns
 
 
 def _is_due(status: os.stat_result) -> bool:
     """Return whether the kernel would update the access time, with a margin before its limit of a day."""
-    changed = max(status.st_mtime_ns, status.st_ctime_ns)
-    return status.st_atime_ns <= changed or abs(time.time() - status.st_atime) > _FRESH_SECONDS
+    change_time = max(status.st_mtime_ns, status.st_ctime_ns)
+    return status.st_atime_ns <= change_time or abs(time.time() - status.st_atime) > _FRESH_SECONDS

@@ -43,13 +43,13 @@ def build_command_prefix(readable: list[str], writable: Path) -> list[str]:
             command += ["--cap-add", f"CAP_{power}"]
     else:
         command.append("--unshare-user")
-    shown = (*_list_interpreter_folders(), *readable)
-    for folder in _list_parent_folders(*_SYSTEM_PATHS, *_DEVICES, *shown, str(writable)):
+    visible_paths = (*_list_interpreter_folders(), *readable)
+    for folder in _list_parent_folders(*_SYSTEM_PATHS, *_DEVICES, *visible_paths, str(writable)):
         # Folders that bubblewrap creates itself are accessible only to root.
         command += ["--dir", folder]
     for path in _SYSTEM_PATHS:
         command += ["--ro-bind-try", path, path]
-    for path in shown:
+    for path in visible_paths:
         command += ["--ro-bind", path, path]
     for path in _DEVICES:
         command += ["--dev-bind", path, path]
@@ -65,7 +65,7 @@ def check_available(wrapping: list[str]) -> str | None:
     if _PROGRAM is None:
         return "bwrap is not installed"
     try:
-        ran = subprocess.run(
+        result = subprocess.run(
             [*wrapping, sys.executable, "-I", "-S", "-c", "pass"],
             env={},
             stdin=subprocess.DEVNULL,
@@ -77,14 +77,14 @@ def check_available(wrapping: list[str]) -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"bwrap does not run: {error}"
-    if ran.returncode != 0:
-        said = ran.stderr.strip().splitlines()
-        return said[-1][:200] if said else f"bwrap ends with status {ran.returncode}"
+    if result.returncode != 0:
+        error_lines = result.stderr.strip().splitlines()
+        return error_lines[-1][:200] if error_lines else f"bwrap ends with status {result.returncode}"
     return None
 
 
 def _list_interpreter_folders() -> list[str]:
     """Return the folders of the interpreter and its packages, including the base of a virtual environment."""
     program = Path(sys.executable)
-    found = {sys.prefix, sys.base_prefix, str(program.parent.parent), str(program.resolve().parent.parent)}
-    return sorted(found - {"/", "/usr"})
+    folders = {sys.prefix, sys.base_prefix, str(program.parent.parent), str(program.resolve().parent.parent)}
+    return sorted(folders - {"/", "/usr"})

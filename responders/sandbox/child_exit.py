@@ -23,19 +23,19 @@ class KilledFromOutside(HostError):
     """Raised when neither the worker nor the child ended it: most likely the machine is out of memory."""
 
 
-def build_cpu_stop(cpu_seconds: float, place: wire.Frame) -> ChildStopped:
-    """Return the fault of a child that exceeded its CPU limit at ``place``."""
+def build_cpu_stop(cpu_seconds: float, location: wire.Frame) -> ChildStopped:
+    """Return the fault of a child that exceeded its CPU limit at ``location``."""
     sentence = f"it computed for more than {cpu_seconds:g} seconds of CPU time"
-    return ChildStopped(Verdict.CPU_LIMIT, sentence, place["line"], place["file"])
+    return ChildStopped(Verdict.CPU_LIMIT, sentence, location["line"], location["file"])
 
 
-def explain_exit_status(status: int, used: float, cpu_seconds: float) -> ChildStopped | None:
-    """Return the fault for the wait status of a child that ``used`` this CPU time, or None if it was killed."""
+def explain_exit_status(status: int, used_seconds: float, cpu_seconds: float) -> ChildStopped | None:
+    """Return the fault for the wait status of a child that ``used_seconds`` this CPU time, or None if it was killed."""
     if not os.WIFSIGNALED(status):
         return ChildStopped(Verdict.PROGRAM_ERROR, _CLOSED_MESSAGE)
     number = os.WTERMSIG(status)
     # The kernel's limit on processor time, a second or two above ours, also ends with SIGKILL.
-    if number == signal.SIGXCPU or (number == signal.SIGKILL and used > cpu_seconds):
+    if number == signal.SIGXCPU or (number == signal.SIGKILL and used_seconds > cpu_seconds):
         return build_cpu_stop(cpu_seconds, NOWHERE)
     if number == signal.SIGSYS:
         return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
@@ -44,32 +44,32 @@ def explain_exit_status(status: int, used: float, cpu_seconds: float) -> ChildSt
     return None
 
 
-def explain_kill(had_ended: bool, overran: bool, blamed: bool) -> ChildStopped:
-    """Return the fault of a child that was killed: by the worker, unless it ``had_ended`` before.
+def explain_kill(has_ended: bool, has_overrun: bool, is_blamed: bool) -> ChildStopped:
+    """Return the fault of a child that was killed: by the worker, unless it ``has_ended`` before.
 
     Args:
-        had_ended: The child had ended before the worker killed it.
-        overran: The processes of the submission together exceeded their memory limit.
-        blamed: The child ran alone on this machine and had been killed before.
+        has_ended: The child had ended before the worker killed it.
+        has_overrun: The processes of the submission together exceeded their memory limit.
+        is_blamed: The child ran alone on this machine and had been killed before.
 
     Raises:
         KilledFromOutside: If the child did not cause it.
     """
-    if not had_ended:
+    if not has_ended:
         # The child was running until the worker killed it: it had only closed the wire.
         return ChildStopped(Verdict.PROGRAM_ERROR, _CLOSED_MESSAGE)
-    if overran:
+    if has_overrun:
         sentence = "the submission's processes took more memory together than they may have"
         return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
-    if blamed:
+    if is_blamed:
         sentence = "its process was killed, again and with nothing else running: it takes more memory than there is"
         return ChildStopped(Verdict.MEMORY_LIMIT, sentence)
     raise KilledFromOutside("something on this machine killed a student's process: is there enough memory?")
 
 
-def parse_place(unread: bytes) -> wire.Frame:
+def parse_place(unread_output: bytes) -> wire.Frame:
     """Return the place that a child reports when asked, from its unread output."""
-    for line in reversed(unread.split(b"\n")):
+    for line in reversed(unread_output.split(b"\n")):
         # Packets may precede the frame.
         start = max(line.rfind(wire.LINE_START), 0)
         with contextlib.suppress(wire.WireError):

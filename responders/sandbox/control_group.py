@@ -51,8 +51,8 @@ def divide_group(proc: Path = _PROC) -> str | None:
     try:
         service.mkdir(exist_ok=True)
         (service / "cgroup.procs").write_text("0")
-        wanted = _WANTED & set((group / "cgroup.controllers").read_text().split())
-        (group / "cgroup.subtree_control").write_text(" ".join(f"+{name}" for name in sorted(wanted)))
+        controllers = _WANTED & set((group / "cgroup.controllers").read_text().split())
+        (group / "cgroup.subtree_control").write_text(" ".join(f"+{name}" for name in sorted(controllers)))
     except OSError as error:
         with contextlib.suppress(OSError):
             (group / "cgroup.procs").write_text("0")
@@ -71,7 +71,7 @@ def check_available(proc: Path = _PROC) -> str | None:
 
 
 class ControlGroup:
-    """The control group of one slot. Zygotes are started through ``joining``; the processes they fork stay in it."""
+    """The control group of one slot. Zygotes are started through ``command_prefix``; the processes they fork stay in it."""
 
     def __init__(self, folder: Path, memory_mb: int) -> None:
         """Create the group.
@@ -115,20 +115,20 @@ class ControlGroup:
 
         The counter ``oom_kill`` is not enough, because it also counts processes killed for a full parent group.
         """
-        killed, full = self._read_events()
+        kill_count, full_count = self._read_events()
 
-        def overran() -> bool:
-            killed_now, full_now = self._read_events()
-            return killed_now > killed and full_now > full
+        def has_overrun() -> bool:
+            new_kill_count, new_full_count = self._read_events()
+            return new_kill_count > kill_count and new_full_count > full_count
 
-        return overran
+        return has_overrun
 
     def close(self) -> None:
         """Kill the remaining processes and remove the group."""
         with contextlib.suppress(OSError):
             self._write_setting("cgroup.kill", 1)
-        until = time.monotonic() + _END_SECONDS
-        while not _try_remove(self._folder) and time.monotonic() < until:
+        deadline = time.monotonic() + _END_SECONDS
+        while not _try_remove(self._folder) and time.monotonic() < deadline:
             time.sleep(0.01)
 
     def _read_events(self) -> tuple[int, int]:
@@ -150,12 +150,12 @@ def create_slot_group(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None
         HostError: If the group can't be created.
     """
     try:
-        own = _locate_own_group(proc)
+        own_group = _locate_own_group(proc)
     except _NotDelegated:
         return None
-    if own.name != _SERVICE:
+    if own_group.name != _SERVICE:
         return None
-    return ControlGroup(own.parent / f"{_SLOT}{os.getpid()}", memory_mb)
+    return ControlGroup(own_group.parent / f"{_SLOT}{os.getpid()}", memory_mb)
 
 
 def _locate_delegated_group(proc: Path) -> Path:
@@ -164,19 +164,19 @@ def _locate_delegated_group(proc: Path) -> Path:
     Raises:
         _NotDelegated: If there is none.
     """
-    own = _locate_own_group(proc)
-    group = own.parent if own.name == _SERVICE else own
+    own_group = _locate_own_group(proc)
+    group = own_group.parent if own_group.name == _SERVICE else own_group
     try:
-        missing = _NEEDED - set((group / "cgroup.controllers").read_text().split())
-        processes = (own / "cgroup.procs").read_text().split()
+        missing_controllers = _NEEDED - set((group / "cgroup.controllers").read_text().split())
+        processes = (own_group / "cgroup.procs").read_text().split()
     except OSError as error:
-        raise _NotDelegated(f"{own} cannot be read: {error.strerror}") from None
-    if missing:
-        raise _NotDelegated(f"{group} does not have the controllers {' and '.join(sorted(missing))}")
-    for each in (group, group / "cgroup.procs", group / "cgroup.subtree_control"):
-        if not os.access(each, os.W_OK):
-            raise _NotDelegated(f"{each} cannot be written")
-    if own == group and processes != [str(os.getpid())]:
+        raise _NotDelegated(f"{own_group} cannot be read: {error.strerror}") from None
+    if missing_controllers:
+        raise _NotDelegated(f"{group} does not have the controllers {' and '.join(sorted(missing_controllers))}")
+    for path in (group, group / "cgroup.procs", group / "cgroup.subtree_control"):
+        if not os.access(path, os.W_OK):
+            raise _NotDelegated(f"{path} cannot be written")
+    if own_group == group and processes != [str(os.getpid())]:
         raise _NotDelegated(f"other processes are in {group}, too")
     return group
 
@@ -192,14 +192,14 @@ def _locate_own_group(proc: Path) -> Path:
         mounts = (proc / "self" / "mountinfo").read_text().splitlines()
     except OSError as error:
         raise _NotDelegated(f"{error.filename} cannot be read") from None
-    own = next((line.removeprefix("0::") for line in groups if line.startswith("0::")), None)
-    if own is None:
+    group_path = next((line.removeprefix("0::") for line in groups if line.startswith("0::")), None)
+    if group_path is None:
         raise _NotDelegated("the kernel has no control groups of version 2")
     for line in mounts:
-        place, _, kind = line.partition(" - ")
-        root, mounted = place.split()[3:5]
-        if kind.startswith("cgroup2 ") and Path(own).is_relative_to(root):
-            return Path(mounted) / Path(own).relative_to(root)
+        mount_fields, _, kind = line.partition(" - ")
+        root, mount_point = mount_fields.split()[3:5]
+        if kind.startswith("cgroup2 ") and Path(group_path).is_relative_to(root):
+            return Path(mount_point) / Path(group_path).relative_to(root)
     raise _NotDelegated("control groups of version 2 are not mounted")
 
 

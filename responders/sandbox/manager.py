@@ -47,10 +47,10 @@ class Sandboxes:
         self._cpu_of_closed = 0.0
         self._given_libraries: JobMeter | None = None  # the meter of the last job that needed them
 
-    def begin(self, role: ChildRole, without: tuple[str, ...]) -> None:
+    def begin(self, role: ChildRole, exclusions: tuple[str, ...]) -> None:
         """Start the zygote for this role without waiting for it. Errors appear when it is used."""
         with contextlib.suppress(OSError):
-            self._provide_zygote(role, without).begin()
+            self._provide_zygote(role, exclusions).begin()
 
     def spawn(
         self, role: ChildRole, limits: ChildLimits, folder: Path | None = None, meter: JobMeter | None = None
@@ -69,7 +69,7 @@ class Sandboxes:
             self._group.adjust_memory_limit(sum(allowed for _, allowed in self._living) + limits.memory_bytes)
         if meter is not None and meter is self._given_libraries:
             role = WITH_LIBRARIES[role]
-        child = self._provide_zygote(role, limits.excluded_modules).spawn(limits, folder, meter, blamed=self._blamed)
+        child = self._provide_zygote(role, limits.excluded_modules).spawn(limits, folder, meter, is_blamed=self._blamed)
         if self._group is not None:
             self._living.append((child, limits.memory_bytes))
         return child
@@ -118,10 +118,12 @@ class Sandboxes:
             if zygote.without_doorkeeper is not None:
                 return f"nobody decides which paths it may name ({zygote.without_doorkeeper})"
             if zygote.without_bubblewrap is not None:  # bubblewrap mounts read-only, so access times don't change
-                own = [find_module_folder(role) for role in ROLES]
-                dated = access_times.read_beforehand(grants.list_readable_paths(own), grants.list_listable_folders(own))
-                if dated is not None:
-                    return dated
+                module_folders = [find_module_folder(role) for role in ROLES]
+                problem = access_times.read_beforehand(
+                    grants.list_readable_paths(module_folders), grants.list_listable_folders(module_folders)
+                )
+                if problem is not None:
+                    return problem
             self._forgets_until = now + access_times.VALID_SECONDS
         return None
 
@@ -129,17 +131,17 @@ class Sandboxes:
         """Return a context manager for the folder of one trial, which is removed afterwards with all its content."""
         return self._folders.one()
 
-    def _provide_zygote(self, role: ChildRole, without: tuple[str, ...] = ()) -> Zygote:
+    def _provide_zygote(self, role: ChildRole, exclusions: tuple[str, ...] = ()) -> Zygote:
         """Return the zygote for a role. Without some third-party packages, a second zygote is kept for the current job.
 
         Modules of Python's standard library are loaded in both and hidden in the child.
         """
-        packages = tuple(name for name in without if name.partition(".")[0] not in sys.stdlib_module_names)
+        packages = tuple(name for name in exclusions if name.partition(".")[0] not in sys.stdlib_module_names)
         key = (role, packages)
         if key not in self._zygotes:
-            for other in [other for other in self._zygotes if other[0] == role and other[1] and packages]:
-                self._cpu_of_closed += self._zygotes[other].children_cpu_seconds
-                self._zygotes.pop(other).close()
+            for old_key in [other for other in self._zygotes if other[0] == role and other[1] and packages]:
+                self._cpu_of_closed += self._zygotes[old_key].children_cpu_seconds
+                self._zygotes.pop(old_key).close()
             self._zygotes[key] = Zygote(role, self.isolation, self._folders, self._group, packages)
         return self._zygotes[key]
 

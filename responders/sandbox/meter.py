@@ -125,6 +125,10 @@ class JobMeter:
         self._cpu += cpu_seconds
         self._sleep += max(0.0, sleep_seconds - _FREE_SLEEP_SECONDS)
 
-    def refund_since(self, before: JobCosts) -> None:
-        """Refund the costs since ``before``, because the host caused the failure."""
-        self._kept, self._cpu, self._sleep = before.kept_bytes, before.cpu_seconds, before.sleep_seconds
+    def refund_since(self, earlier_costs: JobCosts) -> None:
+        """Refund the costs since ``earlier_costs``, because the host caused the failure."""
+        self._kept, self._cpu, self._sleep = (
+            earlier_costs.kept_bytes,
+            earlier_costs.cpu_seconds,
+            earlier_costs.sleep_seconds,
+        )

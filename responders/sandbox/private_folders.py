@@ -69,13 +69,13 @@ class PrivateFolders:
                     if _read_inode_number(folder) >= end:
                         break
             return
-        taking = Path(tempfile.mkdtemp(dir=folder))
+        reserve = Path(tempfile.mkdtemp(dir=folder))
         try:
-            for place in range(secrets.randbelow(_MAX_RESERVED_INODES)):
-                (taking / str(place)).touch(0o600)
+            for number in range(secrets.randbelow(_MAX_RESERVED_INODES)):
+                (reserve / str(number)).touch(0o600)
             yield
         finally:
-            _remove_folder(taking)
+            _remove_folder(reserve)
 
     def close(self) -> None:
         """Remove the folder and release its lock."""
@@ -87,10 +87,10 @@ class PrivateFolders:
             self._lock = -1
 
     def _create_parent(self, path: Path | None) -> None:
-        path, locked = create_locked_folder(_PREFIX, _MODE, path)
+        path, lock = create_locked_folder(_PREFIX, _MODE, path)
         if self._lock >= 0:
             os.close(self._lock)
-        self._path, self._lock = path, locked
+        self._path, self._lock = path, lock
         self._counting = len({_read_inode_number(path) for _ in range(4)}) == 4
 
 
@@ -111,13 +111,13 @@ def create_locked_folder(prefix: str, mode: int, path: Path | None = None) -> tu
         The folder, and its lock: a descriptor to close at the end.
     """
     # The hidden name protects it from the removal of left-overs until it is locked.
-    hidden = Path(tempfile.mkdtemp(prefix=f".{prefix}"))
-    hidden.chmod(mode)
-    path = path or hidden.with_name(hidden.name.removeprefix("."))
-    locked = os.open(hidden, os.O_RDONLY | os.O_DIRECTORY)
-    fcntl.flock(locked, fcntl.LOCK_EX)
-    hidden.rename(path)
-    return path, locked
+    hidden_folder = Path(tempfile.mkdtemp(prefix=f".{prefix}"))
+    hidden_folder.chmod(mode)
+    path = path or hidden_folder.with_name(hidden_folder.name.removeprefix("."))
+    lock = os.open(hidden_folder, os.O_RDONLY | os.O_DIRECTORY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    hidden_folder.rename(path)
+    return path, lock
 
 
 def remove_left_overs(prefix: str = _PREFIX) -> None:

@@ -46,11 +46,11 @@ def find_signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def measure_folder(folder: Path, most: int) -> tuple[int, int]:
-    """Return the total size in bytes and the number of files in a flat folder, up to ``most`` files."""
+def measure_folder(folder: Path, max_files: int) -> tuple[int, int]:
+    """Return the total size in bytes and the number of files in a flat folder, up to ``max_files`` files."""
     size = count = 0
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in itertools.islice(entries, most):
+        for entry in itertools.islice(entries, max_files):
             count += 1
             with contextlib.suppress(OSError):
                 size += entry.stat(follow_symlinks=False).st_size
@@ -59,5 +59,5 @@ def measure_folder(folder: Path, most: int) -> tuple[int, int]:
 
 def _read_schedule(process: int | str) -> tuple[float, float]:
     """Return the seconds that a process has run and has waited for a processor, from ``/proc``."""
-    run, queued, _ = Path(f"/proc/{process}/schedstat").read_text().split()
-    return int(run) / 1e9, int(queued) / 1e9
+    run_time, queue_time, _ = Path(f"/proc/{process}/schedstat").read_text().split()
+    return int(run_time) / 1e9, int(queue_time) / 1e9

@@ -19,29 +19,29 @@ _libc = ctypes.CDLL(None)
 @contextlib.contextmanager
 def one_processor() -> Iterator[None]:
     """Within this context, pin this thread and the children forked for it to a processor unused by other trials."""
-    allowed = os.sched_getaffinity(0)
-    if len(allowed) == 1:
+    allowed_processors = os.sched_getaffinity(0)
+    if len(allowed_processors) == 1:
         yield
         return
-    with contextlib.ExitStack() as kept:
-        processor = _reserve_processor(allowed, kept)
+    with contextlib.ExitStack() as stack:
+        processor = _reserve_processor(allowed_processors, stack)
         if processor is not None:
             os.sched_setaffinity(0, {processor})
-            kept.callback(os.sched_setaffinity, 0, allowed)
+            stack.callback(os.sched_setaffinity, 0, allowed_processors)
         yield
 
 
-def _reserve_processor(allowed: Set[int], kept: contextlib.ExitStack) -> int | None:
-    """Reserve a free processor until ``kept`` is closed, preferably the current one. Return None if none is free."""
-    here = _libc.sched_getcpu()
-    for processor in sorted(allowed, key=lambda each: each != here):
-        taking = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+def _reserve_processor(allowed_processors: Set[int], stack: contextlib.ExitStack) -> int | None:
+    """Reserve a free processor until ``stack`` is closed, preferably the current one. Return None if none is free."""
+    current_processor = _libc.sched_getcpu()
+    for processor in sorted(allowed_processors, key=lambda each: each != current_processor):
+        lock_socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
             # An abstract socket name is released when its process ends, for whatever reason.
-            taking.bind(f"\0robomark-processor-{processor}")
+            lock_socket.bind(f"\0robomark-processor-{processor}")
         except OSError:
-            taking.close()
+            lock_socket.close()
         else:
-            kept.enter_context(taking)
+            stack.enter_context(lock_socket)
             return processor
     return None

@@ -63,8 +63,8 @@ class ServedChild(Protocol):
 
     sandbox: str
 
-    def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
-        """Send one frame. ``arrived`` holds JSON texts."""
+    def send(self, frame: dict[str, Any], entries: Sequence[str] = ()) -> None:
+        """Send one frame. ``entries`` holds JSON texts."""
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         """Send readings, without arrivals."""
@@ -132,21 +132,21 @@ class Child:
         self._queued_before = process_state.read_queued_seconds()
 
     def begin(
-        self, meter: JobMeter, blamed: bool, has_libraries: bool, overran: Callable[[], bool] | None = None
+        self, meter: JobMeter, is_blamed: bool, has_libraries: bool, has_overrun: Callable[[], bool] | None = None
     ) -> None:
         """Allow student code in the child and charge its costs to ``meter``.
 
         Args:
             meter: The meter of the job.
-            blamed: The child counts as the cause if it is killed: it runs alone here and was killed before.
+            is_blamed: The child counts as the cause if it is killed: it runs alone here and was killed before.
             has_libraries: Libraries are loaded. Otherwise the child may ask for them.
-            overran: Returns whether the processes of the submission together exceeded their memory limit.
+            has_overrun: Returns whether the processes of the submission together exceeded their memory limit.
         """
-        self._meter, self._blamed, self._has_libraries, self._overran = meter, blamed, has_libraries, overran
+        self._meter, self._blamed, self._has_libraries, self._overran = meter, is_blamed, has_libraries, has_overrun
 
-    def send(self, frame: dict[str, Any], arrived: Sequence[str] = ()) -> None:
-        """Send one frame. ``arrived`` holds JSON texts. Write errors appear at the next ``receive``."""
-        self._send_bytes(wire.encode_frame(frame, self._sent, arrived))
+    def send(self, frame: dict[str, Any], entries: Sequence[str] = ()) -> None:
+        """Send one frame. ``entries`` holds JSON texts. Write errors appear at the next ``receive``."""
+        self._send_bytes(wire.encode_frame(frame, self._sent, entries))
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         """Send readings, without arrivals: the time, and the values of all sensors."""
@@ -165,18 +165,18 @@ class Child:
 
     def _send_slowly(self, frame: bytes) -> None:
         """Send the rest of a frame to a child that has not yet read earlier data."""
-        began = time.monotonic()
+        start = time.monotonic()
         while frame:
             select.select([], [self._writing], [], _POLL_SECONDS)
             try:
                 frame = frame[os.write(self._writing, frame) :]
             except BlockingIOError:
                 self._check_cpu()
-                if time.monotonic() - began > _STALLED_SECONDS:
+                if time.monotonic() - start > _STALLED_SECONDS:
                     raise self._build_stall_stop() from None
             except OSError:
                 return
-        self._waited += time.monotonic() - began
+        self._waited += time.monotonic() - start
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         """Return the next frame, charged to the meter if any of its text may be stored.
@@ -223,10 +223,10 @@ class Child:
         if len(data) < size:
             data = self._read_at_least(data, size)
         self._pending = data[size:]
-        acts = packets.unpack_actions(data[:size])
+        actions = packets.unpack_actions(data[:size])
         self._check_number(number)
-        self._charged += len(acts) * _ACT_CPU_SECONDS
-        return acts
+        self._charged += len(actions) * _ACT_CPU_SECONDS
+        return actions
 
     def _read_at_least(self, data: bytes, size: int) -> bytes:
         """Read until there are at least ``size`` bytes, beginning with ``data``."""
@@ -288,23 +288,23 @@ class Child:
 
     def _read_more(self) -> bytes:
         """Return the next bytes from the child, at least one."""
-        last_cpu, still_since = -1.0, time.monotonic()
-        began = still_since
+        last_cpu, idle_start = -1.0, time.monotonic()
+        wait_start = idle_start
         while not self._answered.poll(_POLL_SECONDS * 1000):
             now = time.monotonic()
-            self._waited += now - began
-            began = now
+            self._waited += now - wait_start
+            wait_start = now
             self._meter.heartbeat()
-            used = self._check_cpu()
+            cpu_seconds = self._check_cpu()
             self._check_sleep()
-            if used != last_cpu or process_state.is_runnable(self._pid):
-                last_cpu, still_since = used, now
-            elif now - still_since > _STALLED_SECONDS:
+            if cpu_seconds != last_cpu or process_state.is_runnable(self._pid):
+                last_cpu, idle_start = cpu_seconds, now
+            elif now - idle_start > _STALLED_SECONDS:
                 if self.measured:
-                    self._watch_beyond_limit(computing=False)
+                    self._watch_beyond_limit(is_computing=False)
                 raise self._build_stall_stop()
         now = time.monotonic()
-        self._waited += now - began
+        self._waited += now - wait_start
         data = os.read(self._reading, _READ_BYTES)
         if not data:
             raise self._explain_end()
@@ -322,33 +322,33 @@ class Child:
             ChildStopped: If they exceed the limit, or the folder has grown too large.
         """
         self._check_folder()
-        used = self.measure_cpu_seconds()
-        charged = max(used, self._charged)
-        if charged > self._limits.cpu_seconds:
+        cpu_seconds = self.measure_cpu_seconds()
+        charged_seconds = max(cpu_seconds, self._charged)
+        if charged_seconds > self._limits.cpu_seconds:
             if self.measured:
-                self._watch_beyond_limit(computing=True)
+                self._watch_beyond_limit(is_computing=True)
             raise child_exit.build_cpu_stop(self._limits.cpu_seconds, self._request_place())
-        self._meter.check_cpu(charged)
-        return used
+        self._meter.check_cpu(charged_seconds)
+        return cpu_seconds
 
-    def _watch_beyond_limit(self, computing: bool) -> None:
+    def _watch_beyond_limit(self, is_computing: bool) -> None:
         """Check whether a child at its limit continues without output up to twice the limit, computing or asleep."""
-        used, still_since = self.measure_cpu_seconds(), time.monotonic()
+        cpu_seconds, idle_start = self.measure_cpu_seconds(), time.monotonic()
         with contextlib.suppress(ChildStopped):
             while not self._answered.poll(_POLL_SECONDS * 1000):
                 self._meter.heartbeat()
                 self._check_folder()
-                before, used = used, self.measure_cpu_seconds()
-                slept_on = time.monotonic() - still_since > _STALLED_SECONDS
-                if used > 2 * self._limits.cpu_seconds or (slept_on and not computing):
+                last_cpu, cpu_seconds = cpu_seconds, self.measure_cpu_seconds()
+                is_asleep = time.monotonic() - idle_start > _STALLED_SECONDS
+                if cpu_seconds > 2 * self._limits.cpu_seconds or (is_asleep and not is_computing):
                     self.outlasted = True
                     return
-                if used == before and slept_on:
+                if cpu_seconds == last_cpu and is_asleep:
                     return
-                if used != before:
-                    if not computing:
+                if cpu_seconds != last_cpu:
+                    if not is_computing:
                         return
-                    still_since = time.monotonic()
+                    idle_start = time.monotonic()
 
     def _check_sleep(self) -> None:
         """Limit the real time in which neither the child nor the worker ran or waited for a processor.
@@ -386,16 +386,16 @@ class Child:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
         deadline = time.monotonic() + _LAST_PLACE_SECONDS
-        enough = self.measure_cpu_seconds() + _LAST_PLACE_CPU_SECONDS
+        cpu_deadline = self.measure_cpu_seconds() + _LAST_PLACE_CPU_SECONDS
         data = self._pending
-        while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < enough:
+        while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < cpu_deadline:
             if time.monotonic() > deadline and not process_state.is_runnable(self._pid):
                 break
             if self._answered.poll(_POLL_SECONDS * 1000):
-                more = os.read(self._reading, wire.MAX_FRAME_BYTES)
-                if not more:
+                new_data = os.read(self._reading, wire.MAX_FRAME_BYTES)
+                if not new_data:
                     break
-                data += more
+                data += new_data
         return child_exit.parse_place(data)
 
     def _build_stall_stop(self) -> ChildStopped:
@@ -410,21 +410,21 @@ class Child:
         Raises:
             KilledFromOutside: If neither the worker nor the child ended it.
         """
-        used = self.measure_cpu_seconds()
-        ended = self._has_ended()
+        cpu_seconds = self.measure_cpu_seconds()
+        has_ended = self._has_ended()
         self._kill_and_charge()
-        stopped = child_exit.explain_exit_status(self._reap(), used, self._limits.cpu_seconds)
-        if stopped is not None:
-            return stopped
-        overran = ended and self._overran is not None and self._overran()
-        return child_exit.explain_kill(ended, overran, self._blamed)
+        stop = child_exit.explain_exit_status(self._reap(), cpu_seconds, self._limits.cpu_seconds)
+        if stop is not None:
+            return stop
+        has_overrun = has_ended and self._overran is not None and self._overran()
+        return child_exit.explain_kill(has_ended, has_overrun, self._blamed)
 
     def _has_ended(self) -> bool:
         """Return whether the child ends within a second: a dying process closes the wire a moment earlier."""
-        began = time.monotonic()
-        ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
-        self._waited += time.monotonic() - began
-        return ended
+        start = time.monotonic()
+        has_ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
+        self._waited += time.monotonic() - start
+        return has_ended
 
     def _kill_and_charge(self) -> None:
         """Kill the child and report its costs to the meter."""

@@ -91,13 +91,15 @@ FULL_ISOLATION = Isolation()
 NO_ISOLATION = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
 
 
-def describe_layers(standing: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
+def describe_layers(active_layers: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
     """Return the sandbox layers as shown in grades and reports."""
-    layers = [f"Landlock {standing['landlock']}"] * bool(standing["landlock"]) + ["seccomp"] * standing["seccomp"]
-    layers += ["doorkeeper"] * (standing["without_doorkeeper"] is None) + ["own user"] * standing["own_user"]
+    layers = [f"Landlock {active_layers['landlock']}"] * bool(active_layers["landlock"]) + ["seccomp"] * active_layers[
+        "seccomp"
+    ]
+    layers += ["doorkeeper"] * (active_layers["without_doorkeeper"] is None) + ["own user"] * active_layers["own_user"]
     layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
-    layers += ["fixed addresses"] * (bool(layers) and standing["fixed_addresses"])
-    policy = standing["policy"]
+    layers += ["fixed addresses"] * (bool(layers) and active_layers["fixed_addresses"])
+    policy = active_layers["policy"]
     return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
@@ -107,15 +109,15 @@ class Zygote:
     def __init__(
         self,
         role: ChildRole,
-        sandbox: Isolation,
+        isolation: Isolation,
         folders: PrivateFolders,
         group: ControlGroup | None = None,
-        without: tuple[str, ...] = (),
+        exclusions: tuple[str, ...] = (),
     ) -> None:
         self._role = role
         self._group = group
-        self._without = without
-        self._sandbox = sandbox
+        self._without = exclusions
+        self._sandbox = isolation
         self._folders = folders
         self._folders_inside = -1  # descriptor of the private folders' parent, opened inside the zygote
         self._forks = self._living = 0  # forked children, and those not yet ended
@@ -133,7 +135,7 @@ class Zygote:
         folder: Path | None = None,
         meter: JobMeter | None = None,
         work: ChildWork = "role",
-        blamed: bool = False,
+        is_blamed: bool = False,
     ) -> Child:
         """Return a fresh child, in a private ``folder`` or with none.
 
@@ -147,7 +149,7 @@ class Zygote:
         self._forks += 1
         for attempt in (1, 2):
             try:
-                return self._spawn(limits, folder, meter or JobMeter(), work, blamed)
+                return self._spawn(limits, folder, meter or JobMeter(), work, is_blamed)
             except (OSError, EOFError, _ZygoteEnded) as error:
                 self.close()
                 if attempt == 2:
@@ -166,15 +168,15 @@ class Zygote:
             return child.sandbox
         child = self.spawn(_BATTERY_LIMITS, work="battery")
         try:
-            told = child.receive(wire.BATTERY)
+            report = child.receive(wire.BATTERY)
         except ChildStopped as stop:
             raise _build_missing_error(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
             child.close()
-        if told["through"] and self._sandbox.landlock and self._sandbox.seccomp:
-            raise _build_missing_error(f"they let through: {', '.join(str(name)[:60] for name in told['through'])}")
-        refused = told["tried"] - len(told["through"])
-        return f"{child.sandbox} (battery {told['version']}: {refused} of {told['tried']} refused)"
+        if report["through"] and self._sandbox.landlock and self._sandbox.seccomp:
+            raise _build_missing_error(f"they let through: {', '.join(str(name)[:60] for name in report['through'])}")
+        refusals = report["tried"] - len(report["through"])
+        return f"{child.sandbox} (battery {report['version']}: {refusals} of {report['tried']} refused)"
 
     def reap(self, pid: int) -> int:
         """Return the wait status of a child that has ended.
@@ -183,10 +185,10 @@ class Zygote:
             HostError: If the zygote has ended.
         """
         try:
-            ended, _ = self._send_order(pid)
+            exit_report, _ = self._send_order(pid)
             self._living -= 1
-            status, *used = _EXIT_REPORT.unpack_from(ended)
-            self.children_cpu_seconds += sum(used[0::2]) + sum(used[1::2]) / 1e6
+            status, *cpu_times = _EXIT_REPORT.unpack_from(exit_report)
+            self.children_cpu_seconds += sum(cpu_times[0::2]) + sum(cpu_times[1::2]) / 1e6
             return int(status)
         except (OSError, EOFError, struct.error) as error:
             # The children died with the zygote, which is not the student's fault.
@@ -195,8 +197,8 @@ class Zygote:
 
     def close(self) -> None:
         """End the zygote, by force if necessary, and close its sockets."""
-        for opened in self._sockets:
-            opened.close()
+        for open_socket in self._sockets:
+            open_socket.close()
         self._sockets = ()
         if self._process is not None:
             # The zygote ends by itself when its sockets close, and its doorkeeper after it, unless it hangs.
@@ -210,7 +212,9 @@ class Zygote:
             self._folders_inside = -1
         self._forks = self._living = 0
 
-    def _spawn(self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: ChildWork, blamed: bool) -> Child:
+    def _spawn(
+        self, limits: ChildLimits, folder: Path | None, meter: JobMeter, work: ChildWork, is_blamed: bool
+    ) -> Child:
         self._start()
         folders = []
         if folder is not None:
@@ -244,8 +248,8 @@ class Zygote:
             _close_descriptors(reading, writing)
             raise _build_missing_error(answer["missing"])
         self._living += 1
-        inside = answer["pid"]  # the id inside the zygote's namespace
-        reap = functools.partial(self.reap, inside)
+        inner_pid = answer["pid"]  # the id inside the zygote's namespace
+        reap = functools.partial(self.reap, inner_pid)
         child = Child(reap, _read_pid(received[0]), received[0], (reading, writing), limits, folder)
         try:
             _check_signal(received[0])
@@ -254,21 +258,24 @@ class Zygote:
             child.close()
             raise
         watch = self._group.watch_memory_kills() if self._group is not None else None
-        child.begin(meter, blamed, self._role in WITH_LIBRARIES.values(), watch)
+        child.begin(meter, is_blamed, self._role in WITH_LIBRARIES.values(), watch)
         return child
 
     def _check_layers(self, child: Child) -> None:
         """Check the child's first frame, sent before any student code: every requested layer must be active."""
         try:
-            standing = child.receive(wire.SANDBOX)
+            active_layers = child.receive(wire.SANDBOX)
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
-        if standing["missing"] is not None:
-            raise _build_missing_error(standing["missing"])
-        if bool(standing["landlock"]) != bool(self._sandbox.landlock) or standing["seccomp"] != self._sandbox.seccomp:
+        if active_layers["missing"] is not None:
+            raise _build_missing_error(active_layers["missing"])
+        if (
+            bool(active_layers["landlock"]) != bool(self._sandbox.landlock)
+            or active_layers["seccomp"] != self._sandbox.seccomp
+        ):
             raise _build_missing_error("a layer that was asked for does not stand")
-        self.without_doorkeeper = standing["without_doorkeeper"]
-        child.sandbox = describe_layers(standing, self.without_bubblewrap is None, self._group is not None)
+        self.without_doorkeeper = active_layers["without_doorkeeper"]
+        child.sandbox = describe_layers(active_layers, self.without_bubblewrap is None, self._group is not None)
 
     def _start(self) -> None:
         """Start the zygote if necessary and wait until its imports are loaded."""
@@ -311,9 +318,9 @@ class Zygote:
         """Start a clean process without our environment."""
         self.close()
         pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
-        ours, theirs = zip(*pairs, strict=True)
-        numbers = [each.fileno() for each in theirs]
-        joining = self._group.command_prefix if self._group is not None else []
+        worker_ends, zygote_ends = zip(*pairs, strict=True)
+        descriptors = [each.fileno() for each in zygote_ends]
+        group_prefix = self._group.command_prefix if self._group is not None else []
         arguments = [
             str(_HERE),
             self._role,
@@ -323,43 +330,45 @@ class Zygote:
         ]
         try:
             self._process = subprocess.Popen(
-                [*joining, *wrapping, *zygote_command.build_command(numbers, arguments)],
-                pass_fds=numbers,
+                [*group_prefix, *wrapping, *zygote_command.build_command(descriptors, arguments)],
+                pass_fds=descriptors,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 cwd="/",
                 env=zygote_command.build_environment(),
             )
         finally:
-            for each in theirs:
+            for each in zygote_ends:
                 each.close()
-        self._sockets = ours
+        self._sockets = worker_ends
 
     def _fork(self, spec: dict[str, Any], descriptors: list[int]) -> tuple[bytes, list[int]]:
         """Fork a child with this spec and these descriptors. Return the zygote's reply."""
         _, specs = self._require_sockets()
         payload = array.array("i", descriptors)
         specs.sendmsg([json.dumps(spec).encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, payload)])
-        return self._send_order(0, answers=1)
+        return self._send_order(0, socket_index=1)
 
-    def _send_order(self, number: int, answers: int = 0) -> tuple[bytes, list[int]]:
+    def _send_order(self, number: int, socket_index: int = 0) -> tuple[bytes, list[int]]:
         """Send an order to the zygote: 0 for a fork, or the child to reap. Return the reply from the socket."""
         self._require_sockets()[0].send(number.to_bytes(4, "little"))
-        return self._receive_answer(answers)
+        return self._receive_answer(socket_index)
 
-    def _receive_answer(self, which: int = 0) -> tuple[bytes, list[int]]:
+    def _receive_answer(self, socket_index: int = 0) -> tuple[bytes, list[int]]:
         sockets = self._require_sockets()
-        answered, control = sockets[which], sockets[0]
-        ready = select.select({answered, control}, [], [], _START_SECONDS)[0]
+        answer_socket, control = sockets[socket_index], sockets[0]
+        ready = select.select({answer_socket, control}, [], [], _START_SECONDS)[0]
         if not ready:
             raise EOFError("no answer")
-        data, received, _, _ = (answered if answered in ready else control).recvmsg(65536, socket.CMSG_SPACE(8 * 4))
+        data, ancillary, _, _ = (answer_socket if answer_socket in ready else control).recvmsg(
+            65536, socket.CMSG_SPACE(8 * 4)
+        )
         if not data:
             raise EOFError("it ended")
-        found = array.array("i")
-        for _, _, part in received:
-            found.frombytes(part[: len(part) - len(part) % 4])
-        return data, list(found)
+        descriptors = array.array("i")
+        for _, _, part in ancillary:
+            descriptors.frombytes(part[: len(part) - len(part) % 4])
+        return data, list(descriptors)
 
     def _require_sockets(self) -> tuple[socket.socket, ...]:
         if not self._sockets:
@@ -390,9 +399,9 @@ def _check_signal(pidfd: int) -> None:
         raise _build_missing_error(f"pidfd_send_signal: {error.strerror}") from None
 
 
-def _build_missing_error(what: str) -> SandboxMissing:
+def _build_missing_error(reason: str) -> SandboxMissing:
     return SandboxMissing(
-        f"this machine cannot enclose student code: {what}; "
+        f"this machine cannot enclose student code: {reason}; "
         "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
     )
 
@@ -409,12 +418,14 @@ def compile_bytecode(folder: Path) -> None:
     if sys.dont_write_bytecode:
         return
     for file in folder.rglob("*.py"):
-        kept = Path(importlib.util.cache_from_source(file))
-        if os.access(file.parent, os.W_OK) and not (kept.exists() and kept.stat().st_mtime >= file.stat().st_mtime):
-            found = importlib.machinery.PathFinder.find_spec(file.stem, [str(file.parent)])
-            assert found is not None
-            assert isinstance(found.loader, importlib.machinery.SourceFileLoader)
-            found.loader.get_code(file.stem)
+        bytecode_file = Path(importlib.util.cache_from_source(file))
+        if os.access(file.parent, os.W_OK) and not (
+            bytecode_file.exists() and bytecode_file.stat().st_mtime >= file.stat().st_mtime
+        ):
+            module_spec = importlib.machinery.PathFinder.find_spec(file.stem, [str(file.parent)])
+            assert module_spec is not None
+            assert isinstance(module_spec.loader, importlib.machinery.SourceFileLoader)
+            module_spec.loader.get_code(file.stem)
 
 
 def _find_package_folder(name: str) -> Path:

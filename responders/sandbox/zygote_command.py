@@ -38,9 +38,11 @@ def build_command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]
     ``arguments`` are its code folder, its role, the parent of private folders, the excluded modules and the import
     folders of its children.
     """
-    padded = [f"{number:05}" for number in sockets]  # constant length, because a command's length affects addresses
+    padded_numbers = [
+        f"{number:05}" for number in sockets
+    ]  # constant length, because a command's length affects addresses
     # -I would ignore the hash seed.
-    return [*_FIXED_ADDRESS_COMMAND, *build_python_command("-B", "-c", _START_CODE, *padded, *arguments)]
+    return [*_FIXED_ADDRESS_COMMAND, *build_python_command("-B", "-c", _START_CODE, *padded_numbers, *arguments)]
 
 
 def build_environment() -> dict[str, str]:

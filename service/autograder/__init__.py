@@ -29,8 +29,8 @@ def write_autograder(assignment: str, folder: Path, secret: Secret) -> None:
             text = resources.files(__package__).joinpath(name).read_text("utf-8")
             (folder / name).write_text(text.replace("VERSION", GRADER_VERSION), encoding="utf-8", newline="\n")
             (folder / name).chmod(0o755)
-        kept = folder / "secret"
-        kept.touch(0o600)
-        kept.write_text(secret.text, encoding="utf-8")
+        secret_file = folder / "secret"
+        secret_file.touch(0o600)
+        secret_file.write_text(secret.text, encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{folder} cannot be written: {error.strerror}") from None

@@ -21,17 +21,19 @@ def list_appeals(
     """List the open appeals of a course, the longest waiting first."""
     with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
-        found = appeals.list_open(service, actor, course_id)
-        found += appeals.list_answered(service, actor, course_id) if answered else []
-    print_json(appeals=found)
-    if not found:
+        appeal_list = appeals.list_open(service, actor, course_id)
+        appeal_list += appeals.list_answered(service, actor, course_id) if answered else []
+    print_json(appeals=appeal_list)
+    if not appeal_list:
         print_line("no open appeals")
         return
-    listed = create_table("number", "asked", "student", "assignment", "grade", "text", "answer", right=("number",))
-    for each in found:
-        asked = each.asked_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        listed.add_row(str(each.id), asked, each.who, each.assignment, each.job_id, each.text, each.answer or "")
-    print_renderables(listed)
+    table = create_table("number", "asked", "student", "assignment", "grade", "text", "answer", right=("number",))
+    for appeal in appeal_list:
+        asked_time = appeal.asked_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        table.add_row(
+            str(appeal.id), asked_time, appeal.who, appeal.assignment, appeal.job_id, appeal.text, appeal.answer or ""
+        )
+    print_renderables(table)
 
 
 def answer(

@@ -50,15 +50,15 @@ def policy(
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Set the policy, which replaces the earlier one; without options, show it."""
-    allowed = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
-    if drop and allowed != PolicyLimits():
+    limits = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
+    if drop and limits != PolicyLimits():
         raise UsageError("--drop removes all limits, expected no other limits with it")
     with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         if drop:
             policies.drop_policy(service, actor, course_id, assignment)
-        elif allowed != PolicyLimits():
-            policies.set_policy(service, actor, course_id, assignment, allowed)
+        elif limits != PolicyLimits():
+            policies.set_policy(service, actor, course_id, assignment, limits)
         _show_policies(policies.list_policies(service, actor, course_id))
 
 
@@ -80,10 +80,10 @@ def extend(
         request = ExtensionRequest(assignment, due_at, more_attempts)
         policies.extend(service, actor, course_id, member.enrolment_id, request)
     student = member.id
-    until = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
-    more = f", {more_attempts} more attempts" if more_attempts else ""
+    due_text = "" if due_at is None else f" until {due_at:%Y-%m-%d %H:%M}"
+    attempts_text = f", {more_attempts} more attempts" if more_attempts else ""
     print_json(student=student, assignment=assignment, due=due_at, more_attempts=more_attempts)
-    print_line(f"{student}: {assignment or 'every assignment'} may be submitted{until}{more}")
+    print_line(f"{student}: {assignment or 'every assignment'} may be submitted{due_text}{attempts_text}")
 
 
 def enrol(
@@ -93,11 +93,11 @@ def enrol(
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Enrol students before they submit, or add names and addresses to enrolled ids."""
-    listed = list_known_students(read_people(people))
+    students = list_known_students(read_people(people))
     with open_installation() as (service, actor):
-        people_operations.enrol(service, actor, courses.find(service, actor, course), listed)
-    print_json(students=len(listed))
-    print_line(f"{len(listed)} {'student is' if len(listed) == 1 else 'students are'} in the course")
+        people_operations.enrol(service, actor, courses.find(service, actor, course), students)
+    print_json(students=len(students))
+    print_line(f"{len(students)} {'student is' if len(students) == 1 else 'students are'} in the course")
 
 
 def prepare(
@@ -108,24 +108,26 @@ def prepare(
     # This import loads all kinds of criteria, which other commands do not need.
     from submissions.assignment.reader import find_assignment
 
-    found = find_assignment(assignment)
+    definition = find_assignment(assignment)
     with open_installation() as (service, actor):
-        made = assignments.prepare(service, actor, courses.find(service, actor, course), found)
-    _print_state(made)
+        course_assignment = assignments.prepare(service, actor, courses.find(service, actor, course), definition)
+    _print_state(course_assignment)
 
 
 def open_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Let students see a prepared assignment and submit to it on the web."""
     with open_installation() as (service, actor):
-        made = assignments.open_for_students(service, actor, courses.find(service, actor, course), assignment)
-    _print_state(made)
+        course_assignment = assignments.open_for_students(
+            service, actor, courses.find(service, actor, course), assignment
+        )
+    _print_state(course_assignment)
 
 
 def close_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
     """Stop web submissions to an assignment; existing submissions stay."""
     with open_installation() as (service, actor):
-        made = assignments.close(service, actor, courses.find(service, actor, course), assignment)
-    _print_state(made)
+        course_assignment = assignments.close(service, actor, courses.find(service, actor, course), assignment)
+    _print_state(course_assignment)
 
 
 def remove_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
@@ -149,21 +151,21 @@ def show_names(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) 
 def list_courses() -> None:
     """List the courses of this installation."""
     with open_installation() as (service, actor):
-        found = courses.list_courses(service, actor)
-    print_json(courses=found)
-    if not found:
+        course_list = courses.list_courses(service, actor)
+    print_json(courses=course_list)
+    if not course_list:
         print_line("no courses yet")
         return
-    listed = create_table("name", "instructors", "students", right=("instructors", "students"))
-    for each in found:
-        listed.add_row(each.name, str(each.instructors), str(each.students))
-    print_renderables(listed)
+    table = create_table("name", "instructors", "students", right=("instructors", "students"))
+    for course_line in course_list:
+        table.add_row(course_line.name, str(course_line.instructors), str(course_line.students))
+    print_renderables(table)
 
 
 def _set_names_hidden(assignment: str, course: str, *, hidden: bool) -> None:
     with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
-        assignments.hide_names(service, actor, course_id, assignment, hidden=hidden)
+        assignments.hide_names(service, actor, course_id, assignment, names_hidden=hidden)
     print_json(assignment=assignment, names_hidden=hidden)
     print_line(f"{assignment}: names are {'hidden' if hidden else 'shown'}")
 
@@ -190,15 +192,15 @@ def _parse_due(text: str | None) -> datetime | None:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _show_policies(found: dict[str, PolicyLimits]) -> None:
-    print_json(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in found.items()])
-    if not found:
+def _show_policies(limits_by_assignment: dict[str, PolicyLimits]) -> None:
+    print_json(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in limits_by_assignment.items()])
+    if not limits_by_assignment:
         print_line("no policy: all submissions are marked at any time")
         return
-    listed = create_table("assignment", "due", "late days", "attempts", "cool-down")
-    for assignment, allowed in found.items():
-        due = "" if allowed.due_at is None else allowed.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        attempts = "" if allowed.attempts is None else str(allowed.attempts)
-        cool_down = f"{allowed.cool_down_seconds / 60:g} min" if allowed.cool_down_seconds else ""
-        listed.add_row(assignment or "all others", due, str(allowed.late_days), attempts, cool_down)
-    print_renderables(listed)
+    table = create_table("assignment", "due", "late days", "attempts", "cool-down")
+    for assignment, limits in limits_by_assignment.items():
+        due = "" if limits.due_at is None else limits.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        attempts = "" if limits.attempts is None else str(limits.attempts)
+        cool_down = f"{limits.cool_down_seconds / 60:g} min" if limits.cool_down_seconds else ""
+        table.add_row(assignment or "all others", due, str(limits.late_days), attempts, cool_down)
+    print_renderables(table)

@@ -38,9 +38,9 @@ def backup_database(
 def restore_database(file: Annotated[Path, typer.Argument(help="A file created by db backup.")]) -> None:
     """Restore a backup into a database without submissions, SQLite or PostgreSQL."""
     with open_installation() as (service, actor):
-        where = database.restore(service, actor, file)
-    print_json(database=where, file=file)
-    print_line(f"{where} restored from {file}")
+        database_name = database.restore(service, actor, file)
+    print_json(database=database_name, file=file)
+    print_line(f"{database_name} restored from {file}")
 
 
 def purge_database(
@@ -53,7 +53,7 @@ def purge_database(
     Without --archive or --for-good, show how much would be removed.
     """
     try:
-        earliest_kept = parse_time(before)
+        earliest_time = parse_time(before)
     except ValueError:
         raise UsageError(f"--before {before}: expected a date like 2025-09-01") from None
     if archive is not None and for_good:
@@ -62,11 +62,15 @@ def purge_database(
     with open_installation() as (service, actor):
         if archive is not None:
             print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
-        gone = (database.count_old_submissions if only_count else database.remove_old_submissions)(
-            service, actor, earliest_kept
+        removed_counts = (database.count_old_submissions if only_count else database.remove_old_submissions)(
+            service, actor, earliest_time
         )
-    counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
-    print_json(removed=not only_count, archive=archive, **asdict(gone))
+    count_text = (
+        f"{removed_counts.submissions} submissions, {removed_counts.grades} grades, {removed_counts.students} students"
+    )
+    print_json(removed=not only_count, archive=archive, **asdict(removed_counts))
     print_line(
-        f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
+        f"{count_text} to remove; use --archive FILE or --for-good to remove them"
+        if only_count
+        else f"removed: {count_text}"
     )

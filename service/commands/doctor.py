@@ -14,12 +14,12 @@ def doctor() -> None:
     from service.settings import load_settings
 
     findings = examine_machine(load_settings())
-    looked_at = create_table("", "", "")
+    table = create_table("", "", "")
     for finding in findings:
         mark = Text("ok", style="green") if finding.well else Text("wrong", style="red")
-        looked_at.add_row(mark, finding.what, finding.sentence)
+        table.add_row(mark, finding.what, finding.sentence)
     print_json(findings=findings)
-    print_renderables(looked_at)
-    wrong = [finding.what for finding in findings if not finding.well]
-    if wrong:
-        raise HostError(f"problems: {', '.join(wrong)}")
+    print_renderables(table)
+    failed_checks = [finding.what for finding in findings if not finding.well]
+    if failed_checks:
+        raise HostError(f"problems: {', '.join(failed_checks)}")

@@ -16,49 +16,53 @@ from service.reports.display_text import format_decimal, to_one_line
 from submissions.assignment.folder import REFERENCE
 
 
-def build_catalogue_table(checked: Iterable[CheckedAssignment]) -> Table:
+def build_catalogue_table(checked_assignments: Iterable[CheckedAssignment]) -> Table:
     """Return a table with a row for each assignment: marks of the reference and wrong solutions, time, measures."""
     numbers = ("of", REFERENCE, "s")
-    made = create_table("section", "assignment", "of", REFERENCE, "others", "s", "measures (original)", right=numbers)
-    for each in checked:
-        made.add_row(
-            each.assignment.section,
-            Text(each.assignment.id, style="" if not each.problems else "red"),
-            format_decimal(each.assignment.max_marks),
-            " ".join(_format_example_marks(example) for example in each.examples if example.name == REFERENCE),
-            " ".join(_format_example_marks(example) for example in each.examples if example.name != REFERENCE),
-            f"{sum(example.seconds for example in each.examples):.1f}",
-            "; ".join(map(_format_measure, each.measures)),
+    table = create_table("section", "assignment", "of", REFERENCE, "others", "s", "measures (original)", right=numbers)
+    for checked_assignment in checked_assignments:
+        table.add_row(
+            checked_assignment.assignment.section,
+            Text(checked_assignment.assignment.id, style="" if not checked_assignment.problems else "red"),
+            format_decimal(checked_assignment.assignment.max_marks),
+            " ".join(
+                _format_example_marks(example) for example in checked_assignment.examples if example.name == REFERENCE
+            ),
+            " ".join(
+                _format_example_marks(example) for example in checked_assignment.examples if example.name != REFERENCE
+            ),
+            f"{sum(example.seconds for example in checked_assignment.examples):.1f}",
+            "; ".join(map(_format_measure, checked_assignment.measures)),
         )
-    return made
+    return table
 
 
 def build_examples_table(checked: CheckedAssignment) -> Table:
     """Return a table with a row for each example of one assignment."""
-    made = create_table("example", "marks", "loses", "as expected", "s", right=("marks", "s"))
+    table = create_table("example", "marks", "loses", "as expected", "s", right=("marks", "s"))
     for example in checked.examples:
-        made.add_row(
+        table.add_row(
             to_one_line(example.name, 60),
             _format_example_marks(example),
             ", ".join(example.lost),
             Text("no", style="red") if example.problems else Text("yes", style="green"),
             f"{example.seconds:.1f}",
         )
-    return made
+    return table
 
 
 def build_measures_table(checked: CheckedAssignment) -> Table:
     """Return a table that compares the reference's measures with those of the original simulator."""
-    made = create_table("measure", "here", "original", "unit", "", right=("here", "original"))
+    table = create_table("measure", "here", "original", "unit", "", right=("here", "original"))
     for measure in checked.measures:
-        made.add_row(
+        table.add_row(
             measure.original.measure,
             "none" if measure.value is None else f"{measure.value:.6g}",
             f"{measure.original.value:g}",
             measure.unit,
             "" if measure.is_close else measure.original.explained or "differs",
         )
-    return made
+    return table
 
 
 def _format_example_marks(example: ExampleResult) -> str:
@@ -69,5 +73,5 @@ def _format_example_marks(example: ExampleResult) -> str:
 def _format_measure(measure: ComparedMeasure) -> str:
     original = measure.original
     value = "none" if measure.value is None else f"{measure.value:.5g}"
-    why = "" if measure.is_close else f": {original.explained or 'differs'}"
-    return f"{original.measure} {value} ({original.value:g}) {measure.unit}".rstrip() + why
+    note = "" if measure.is_close else f": {original.explained or 'differs'}"
+    return f"{original.measure} {value} ({original.value:g}) {measure.unit}".rstrip() + note

@@ -47,5 +47,5 @@ def grade(
     """
     from service.commands.grading import grade_all
 
-    chosen = "json" if is_json_output() else form
-    grade_all(submissions, assignment, report, chosen, channel.to_table(), language, run=run, unsafe=unsafe)
+    format_name = "json" if is_json_output() else form
+    grade_all(submissions, assignment, report, format_name, channel.to_table(), language, run=run, unsafe=unsafe)

@@ -40,7 +40,7 @@ def grade_all(
     assignment: str | None,
     report: Path | None,
     form: str,
-    given: Mapping[str, object],
+    channel_flags: Mapping[str, object],
     language: str,
     *,
     run: str | None,
@@ -53,7 +53,7 @@ def grade_all(
         assignment: Id or folder of the assignment. None takes the one that each submission names.
         report: Folder for the reports, or None.
         form: Name of the output format.
-        given: Values of the channel flags, by name.
+        channel_flags: Values of the channel flags, by name.
         language: Code of the reports' language.
         run: The run to mark, for a notebook with several runs.
         unsafe: Run student code without the sandbox.
@@ -63,54 +63,60 @@ def grade_all(
         UsageError: At least one submission was rejected, and all others were graded.
     """
     # Read the assignment first: a mistake in it is not an error of a submission.
-    named = None if assignment is None else find_assignment(assignment)
-    chosen = FORMATS[form]
-    together = chosen.table if len(submissions) > 1 else None
+    named_definition = None if assignment is None else find_assignment(assignment)
+    output_format = FORMATS[form]
+    render_table = output_format.table if len(submissions) > 1 else None
     rows: list[TableRow[Grade]] = []
     if report is not None:
         # The plotting library loads slowly.
         from service.reports.output_files import prepare_folder, write_report
 
         prepare_folder(report)
-    near = _find_name_conflicts(submissions) if report is not None else {}
+    name_conflicts = _find_name_conflicts(submissions) if report is not None else {}
     secret = load_home_secret(load_settings())
-    worst: RobomarkError | None = None
+    worst_error: RobomarkError | None = None
     if unsafe:
         warn_about_missing_sandbox()
     with TrialRunner(Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION)) as runner:
         for path in submissions:
             try:
-                if path in near:
-                    raise UsageError(near[path])
-                submission, asked = read_with_assignment(path, named)
+                if path in name_conflicts:
+                    raise UsageError(name_conflicts[path])
+                submission, definition = read_with_assignment(path, named_definition)
                 submission = _select_run(submission, run)
-                graded = grade_submission(submission, _apply_to_scenarios(asked, given), secret=secret, runner=runner)
-                graded = replace(graded, notes=(*_describe_channel_flags(given), *graded.notes))
+                grade = grade_submission(
+                    submission, _apply_to_scenarios(definition, channel_flags), secret=secret, runner=runner
+                )
+                grade = replace(grade, notes=(*_describe_channel_flags(channel_flags), *grade.notes))
             except RobomarkError as error:
-                refused = isinstance(error, UsageError)
-                who = Student(normalise_name(derive_student_name(path)))
+                is_rejected = isinstance(error, UsageError)
+                student = Student(normalise_name(derive_student_name(path)))
                 reason = str(error).removeprefix(f"{sanitise_name(path.name)}: ")
-                row: TableRow[Grade] = TableRow(who, str(path), assignment or "", None, reason, refused)
+                row: TableRow[Grade] = TableRow(student, str(path), assignment or "", None, reason, is_rejected)
                 if len(submissions) == 1:
-                    if refused and chosen.refusal is not None:
-                        sys.stdout.write(chosen.refusal(row))
+                    if is_rejected and output_format.refusal is not None:
+                        sys.stdout.write(output_format.refusal(row))
                     raise
                 rows.append(row)
                 print(f"robomark: {error}", file=sys.stderr)
-                worst = worst if worst is not None and not isinstance(worst, UsageError) else error
+                worst_error = (
+                    worst_error if worst_error is not None and not isinstance(worst_error, UsageError) else error
+                )
                 continue
-            if together is None:
-                _print_grade(chosen, graded, submission)
-            missing = describe_missing_part(graded.missing)
-            rows.append(TableRow(Student(graded.student), str(path), graded.assignment, graded, missing))
+            if render_table is None:
+                _print_grade(output_format, grade, submission)
+            missing = describe_missing_part(grade.missing)
+            rows.append(TableRow(Student(grade.student), str(path), grade.assignment, grade, missing))
             if report is not None:
-                written = write_report(report, graded, submission, derive_student_name(path), load_language(language))
-                print_note(f"report: {written}")
-    if together is not None:
-        sys.stdout.write(together(rows))
-    if worst is not None:
-        kind = UsageError if isinstance(worst, UsageError) else HostError
-        raise kind("some submissions could not be graded")
+                report_path = write_report(
+                    report, grade, submission, derive_student_name(path), load_language(language)
+                )
+                print_note(f"report: {report_path}")
+    if render_table is not None:
+        sys.stdout.write(render_table(rows))
+    if worst_error is not None:
+        error_type = UsageError if isinstance(worst_error, UsageError) else HostError
+        raise error_type("some submissions could not be graded")
 
 
 def _select_run(submission: Submission, run: str | None) -> Submission:
@@ -122,62 +128,70 @@ def _select_run(submission: Submission, run: str | None) -> Submission:
     return replace(submission, run=run)
 
 
-def _apply_to_scenarios(asked: Assignment, given: Mapping[str, object]) -> Assignment:
+def _apply_to_scenarios(assignment: Assignment, channel_flags: Mapping[str, object]) -> Assignment:
     """Return the assignment with the channel flags applied to every scenario.
 
     The result gets a different version, because its grades differ.
     """
-    if not given:
-        return asked
-    scenarios = tuple(replace(each, channel=apply_channel_flags(each.channel, given)) for each in asked.scenarios)
-    version = hashlib.sha256(f"{asked.version}\n{sorted(given.items())}".encode()).hexdigest()
-    return replace(asked, scenarios=scenarios, version=version)
+    if not channel_flags:
+        return assignment
+    scenarios = tuple(
+        replace(each, channel=apply_channel_flags(each.channel, channel_flags)) for each in assignment.scenarios
+    )
+    version = hashlib.sha256(f"{assignment.version}\n{sorted(channel_flags.items())}".encode()).hexdigest()
+    return replace(assignment, scenarios=scenarios, version=version)
 
 
-def _describe_channel_flags(given: Mapping[str, object]) -> tuple[str, ...]:
+def _describe_channel_flags(channel_flags: Mapping[str, object]) -> tuple[str, ...]:
     """Return the notes for a grade that was made with channel flags."""
-    words = ", ".join(f"{name} {value}" for name, value in given.items())
-    return (f"graded with another channel than the assignment's ({words}); these marks do not count",) if given else ()
+    flag_list = ", ".join(f"{name} {value}" for name, value in channel_flags.items())
+    return (
+        (f"graded with another channel than the assignment's ({flag_list}); these marks do not count",)
+        if channel_flags
+        else ()
+    )
 
 
-def _print_grade(form: Format, graded: Grade, submission: Submission) -> None:
+def _print_grade(form: Format, grade: Grade, submission: Submission) -> None:
     if form.terminal is not None and sys.stdout.isatty():
-        print_renderables(form.terminal(graded, submission))
+        print_renderables(form.terminal(grade, submission))
     elif form.document is not None:
-        sys.stdout.write(form.document(graded, submission))
+        sys.stdout.write(form.document(grade, submission))
 
 
 def _find_name_conflicts(paths: Sequence[Path]) -> dict[Path, str]:
     """Return the submissions whose reports would overwrite each other, with an error sentence for each."""
     names = {path: derive_student_name(path) for path in paths}
-    near = find_look_alikes(names.values())
-    times = Counter(map(derive_student_name, paths))
-    found = {
-        path: f"{path}: its student {describe_look_alikes(near[names[path]])}" for path in paths if names[path] in near
+    look_alikes = find_look_alikes(names.values())
+    name_counts = Counter(map(derive_student_name, paths))
+    conflicts = {
+        path: f"{path}: its student {describe_look_alikes(look_alikes[names[path]])}"
+        for path in paths
+        if names[path] in look_alikes
     }
     for path in paths:
-        if times[names[path]] > 1:
-            found.setdefault(path, f"{path}: {sanitise_name(names[path])} is named more than once")
-    return {path: f"{sentence}; expected one report for each student." for path, sentence in found.items()}
+        if name_counts[names[path]] > 1:
+            conflicts.setdefault(path, f"{path}: {sanitise_name(names[path])} is named more than once")
+    return {path: f"{sentence}; expected one report for each student." for path, sentence in conflicts.items()}
 
 
-def read_with_assignment(path: Path, asked: Assignment | None) -> tuple[Submission, Assignment]:
+def read_with_assignment(path: Path, assignment: Assignment | None) -> tuple[Submission, Assignment]:
     """Read a submission and return it with its assignment.
 
     Args:
         path: The submission.
-        asked: The assignment. None takes the one that the submission names.
+        assignment: The assignment. None takes the one that the submission names.
 
     Raises:
         UsageError: The submission or the assignment is invalid.
     """
-    if asked is not None:
-        return read_submission(path, asked=asked.parts), asked
+    if assignment is not None:
+        return read_submission(path, required_parts=assignment.parts), assignment
     submission = read_submission(path)
     if submission.assignment is None:
         raise UsageError(f"{path}: the assignment is unknown; name it with -a or in the submission's submission.toml")
     try:
-        asked = find_in_catalogue(submission.assignment)
+        assignment = find_in_catalogue(submission.assignment)
     except UsageError as error:
         raise UsageError(f"{path}: {error} Name the assignment with -a.") from None
-    return fit_parts(submission, asked.parts), asked
+    return fit_parts(submission, assignment.parts), assignment

@@ -39,9 +39,9 @@ def set_marks(
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        asked = grades.MarksRequest(criterion, marks, reason, seen)
-        _print_marks(grades.set_marks(service, actor, found.course_id, found.id, asked))
+        stored_grade = batches.find_grade(service, actor, grade)
+        request = grades.MarksRequest(criterion, marks, reason, seen)
+        _print_marks(grades.set_marks(service, actor, stored_grade.course_id, stored_grade.id, request))
 
 
 def excuse(grade: GradeId, criterion: CriterionId, reason: Reason, seen: SeenOverride = None) -> None:
@@ -49,9 +49,9 @@ def excuse(grade: GradeId, criterion: CriterionId, reason: Reason, seen: SeenOve
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        asked = grades.MarksRequest(criterion, None, reason, seen)
-        _print_marks(grades.set_marks(service, actor, found.course_id, found.id, asked))
+        stored_grade = batches.find_grade(service, actor, grade)
+        request = grades.MarksRequest(criterion, None, reason, seen)
+        _print_marks(grades.set_marks(service, actor, stored_grade.course_id, stored_grade.id, request))
 
 
 def withdraw(grade: GradeId, criterion: CriterionId, seen: SeenOverride = None) -> None:
@@ -59,8 +59,8 @@ def withdraw(grade: GradeId, criterion: CriterionId, seen: SeenOverride = None) 
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        _print_marks(grades.withdraw_override(service, actor, found.course_id, found.id, criterion, seen))
+        stored_grade = batches.find_grade(service, actor, grade)
+        _print_marks(grades.withdraw_override(service, actor, stored_grade.course_id, stored_grade.id, criterion, seen))
 
 
 def comment(
@@ -72,9 +72,9 @@ def comment(
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        asked = grades.CommentRequest(text, criterion)
-        _print_marks(grades.add_comment(service, actor, found.course_id, found.id, asked))
+        stored_grade = batches.find_grade(service, actor, grade)
+        request = grades.CommentRequest(text, criterion)
+        _print_marks(grades.add_comment(service, actor, stored_grade.course_id, stored_grade.id, request))
 
 
 def uncomment(
@@ -85,8 +85,8 @@ def uncomment(
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        _print_marks(grades.withdraw_comment(service, actor, found.course_id, found.id, number))
+        stored_grade = batches.find_grade(service, actor, grade)
+        _print_marks(grades.withdraw_comment(service, actor, stored_grade.course_id, stored_grade.id, number))
 
 
 def history(grade: GradeId) -> None:
@@ -94,30 +94,36 @@ def history(grade: GradeId) -> None:
     from service.operations import batches, grades
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        marking = grades.show_marking(service, actor, found.course_id, found.id)
-    criteria, written, done = marking.criteria, marking.comments, marking.history
-    print_json(grade=found.id, criteria=criteria, comments=written, history=done)
-    listed = create_table("criterion", "title", "as graded", "counts", "reason", right=("as graded", "counts"))
+        stored_grade = batches.find_grade(service, actor, grade)
+        marking = grades.show_marking(service, actor, stored_grade.course_id, stored_grade.id)
+    criteria, comments, steps = marking.criteria, marking.comments, marking.history
+    print_json(grade=stored_grade.id, criteria=criteria, comments=comments, history=steps)
+    criteria_table = create_table("criterion", "title", "as graded", "counts", "reason", right=("as graded", "counts"))
     for line in criteria:
-        graded = "not judged" if line.graded is None else format_marks(line.graded, line.worth)
+        graded_marks = "not judged" if line.graded is None else format_marks(line.graded, line.worth)
         counts = "" if line.override is None else format_marks(line.marks, line.max_marks)
-        excused = line.override is not None and line.override.marks is None
+        is_excused = line.override is not None and line.override.marks is None
         reason = "" if line.override is None else line.override.reason
-        listed.add_row(line.criterion, line.title, graded, "excused" if excused else counts, reason)
-    print_renderables(listed)
-    for each in written:
-        print_line(f"comment {each.id} of {each.actor}{f' on {each.criterion}' if each.criterion else ''}: {each.text}")
-    if done:
-        told = create_table("when", "who", "did", "criterion", "before", "after", "reason or text")
-        for step in done:
-            when = step.at.astimezone().strftime("%Y-%m-%d %H:%M")
-            told.add_row(when, step.actor, step.action, step.criterion, step.before, step.after, step.text)
-        print_renderables(told)
+        criteria_table.add_row(line.criterion, line.title, graded_marks, "excused" if is_excused else counts, reason)
+    print_renderables(criteria_table)
+    for stored_comment in comments:
+        print_line(
+            f"comment {stored_comment.id} of "
+            f"{stored_comment.actor}{f' on {stored_comment.criterion}' if stored_comment.criterion else ''}: "
+            f"{stored_comment.text}"
+        )
+    if steps:
+        history_table = create_table("when", "who", "did", "criterion", "before", "after", "reason or text")
+        for step in steps:
+            timestamp = step.at.astimezone().strftime("%Y-%m-%d %H:%M")
+            history_table.add_row(
+                timestamp, step.actor, step.action, step.criterion, step.before, step.after, step.text
+            )
+        print_renderables(history_table)
 
 
-def _print_marks(changed: Marking) -> None:
+def _print_marks(marking: Marking) -> None:
     """Print the marks of the grade after a change."""
-    line = changed.line
+    line = marking.line
     print_json(job=line)
     print_line(f"{line.student}, {line.assignment}: {format_marks(line.marks, line.max_marks)}")

@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 _INFRARED = ("beacon", "range", "facing", "blocked_by")
 
 
-def create_format_option(words: str, names: Callable[[], Iterable[str]]) -> Any:
+def create_format_option(help_text: str, names: Callable[[], Iterable[str]]) -> Any:
     """Return an option that accepts one of ``names``.
 
     ``names`` is called only when the option is used, because the formats load slowly.
     """
 
-    def checked(name: str) -> str:
-        known = tuple(names())
-        if name not in known:
-            raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, known))}")
+    def check_name(name: str) -> str:
+        valid_names = tuple(names())
+        if name not in valid_names:
+            raise typer.BadParameter(f"{name!r} is not one of {', '.join(map(repr, valid_names))}")
         return name
 
-    def completed(start: str) -> list[str]:
+    def complete_name(start: str) -> list[str]:
         return [name for name in names() if name.startswith(start)]
 
-    return typer.Option("--format", help=words, metavar="FORMAT", callback=checked, autocompletion=completed)
+    return typer.Option("--format", help=help_text, metavar="FORMAT", callback=check_name, autocompletion=complete_name)
 
 
 def _check_language(code: str) -> str:
@@ -78,17 +78,17 @@ def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
     parameters = list(_expand_parameters(inspect.signature(command).parameters, hints, groups))
 
     @functools.wraps(command)
-    def called(**given: object) -> None:
-        made = {
-            name: group(**{each: given.pop(each) for each in _list_field_names(group)})
+    def expanded_command(**values: object) -> None:
+        group_values = {
+            name: group(**{each: values.pop(each) for each in _list_field_names(group)})
             for name, group in groups.items()
         }
-        command(**given, **made)
+        command(**values, **group_values)
 
-    called.__signature__ = inspect.Signature(parameters, return_annotation=None)  # type: ignore[attr-defined]
-    called.__annotations__ = {each.name: each.annotation for each in parameters} | {"return": None}
-    del called.__wrapped__
-    return called
+    expanded_command.__signature__ = inspect.Signature(parameters, return_annotation=None)  # type: ignore[attr-defined]
+    expanded_command.__annotations__ = {each.name: each.annotation for each in parameters} | {"return": None}
+    del expanded_command.__wrapped__
+    return expanded_command
 
 
 def _expand_parameters(
@@ -98,10 +98,13 @@ def _expand_parameters(
         if name not in groups:
             yield parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
             continue
-        own = get_type_hints(groups[name], include_extras=True)
-        for each in fields(groups[name]):
+        group_hints = get_type_hints(groups[name], include_extras=True)
+        for group_field in fields(groups[name]):
             yield inspect.Parameter(
-                each.name, inspect.Parameter.KEYWORD_ONLY, default=_find_default(each), annotation=own[each.name]
+                group_field.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=_find_default(group_field),
+                annotation=group_hints[group_field.name],
             )
 
 
@@ -148,26 +151,26 @@ class ChannelFlags:
         Raises:
             UsageError: ``--beacon`` is not a pair of coordinates.
         """
-        given: dict[str, object] = {name: value for name, value in asdict(self).items() if value is not None}
+        flags: dict[str, object] = {name: value for name, value in asdict(self).items() if value is not None}
         if self.beacon is not None:
             try:
-                given["beacon"] = [float(number) for number in self.beacon.split(",")]
+                flags["beacon"] = [float(number) for number in self.beacon.split(",")]
             except ValueError:
                 raise UsageError(f"--beacon is {self.beacon}, expected X,Y such as 1200,600") from None
-        return given
+        return flags
 
 
-def apply_channel_flags(channel: Channel, given: Mapping[str, object]) -> Channel:
+def apply_channel_flags(channel: Channel, flags: Mapping[str, object]) -> Channel:
     """Return the channel with the flags applied. Raises UsageError if the values are invalid."""
-    if not given:
+    if not flags:
         return channel
     from responders.channel import Channel
     from submissions.assignment.schema import ChannelTable, read_table
 
     values = {each.name: getattr(channel, each.name) for each in fields(Channel)}
-    needless = _INFRARED if given.get("link", channel.link) == "cable" else ()
-    table = {name: value for name, value in values.items() if name not in needless}
-    read = read_table(ChannelTable, {**table, **given})
-    if isinstance(read, ChannelTable):
-        return Channel(**read.model_dump())
-    raise UsageError("; ".join(problem.sentence.replace("this table", "the channel", 1) for problem in read))
+    unused_fields = _INFRARED if flags.get("link", channel.link) == "cable" else ()
+    table = {name: value for name, value in values.items() if name not in unused_fields}
+    channel_table = read_table(ChannelTable, {**table, **flags})
+    if isinstance(channel_table, ChannelTable):
+        return Channel(**channel_table.model_dump())
+    raise UsageError("; ".join(problem.sentence.replace("this table", "the channel", 1) for problem in channel_table))

@@ -29,14 +29,14 @@ _quiet_output: ContextVar[bool] = ContextVar("quiet", default=False)
 _UNLIMITED_WIDTH = 1_000_000
 
 
-def set_json_output(asked: bool) -> None:
+def set_json_output(is_enabled: bool) -> None:
     """Select JSON output for the rest of this command."""
-    _json_output.set(asked)
+    _json_output.set(is_enabled)
 
 
-def set_quiet_output(asked: bool) -> None:
+def set_quiet_output(is_enabled: bool) -> None:
     """Suppress everything except results and errors for the rest of this command."""
-    _quiet_output.set(asked)
+    _quiet_output.set(is_enabled)
 
 
 def is_json_output() -> bool:
@@ -62,11 +62,11 @@ def print_renderables(*parts: RenderableType) -> None:
         return
     on_terminal = sys.stdout.isatty()
     console = _create_console(on_terminal, stderr=False)
-    with console.capture() as shown:
+    with console.capture() as capture:
         for part in parts:
             console.print(part)
     # Rich pads the last column with spaces, which are removed in files.
-    lines = shown.get().split("\n")
+    lines = capture.get().split("\n")
     sys.stdout.write("\n".join(lines if on_terminal else (line.rstrip() for line in lines)))
 
 
@@ -86,10 +86,10 @@ def create_table(*headings: str, right: Collection[str] = (), title: str = "") -
     """Return an empty table without borders. ``right`` contains the headings of right-aligned columns."""
     from rich.table import Table
 
-    made = Table(box=None, pad_edge=False, title=title or None, title_justify="left", show_header=any(headings))
+    table = Table(box=None, pad_edge=False, title=title or None, title_justify="left", show_header=any(headings))
     for heading in headings:
-        made.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
-    return made
+        table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
+    return table
 
 
 def _create_console(on_terminal: bool, **options: Any) -> Console:

@@ -33,14 +33,14 @@ def add(
     from service.operations import platforms
 
     origins = tuple(service_origins or ())
-    asked = platforms.Registration(
+    registration = platforms.Registration(
         name, issuer, client_id, tuple(deployments), authorization_url, token_url, keys_url, origins
     )
     with open_installation() as (service, actor):
-        registered = platforms.register(service, actor, asked)
-    found = next(each for each in registered if (each.issuer, each.client_id) == (issuer, client_id))
-    print_json(platform=found)
-    print_line(f"platform {found.name} is registered for {found.issuer}")
+        platform_list = platforms.register(service, actor, registration)
+    platform = next(each for each in platform_list if (each.issuer, each.client_id) == (issuer, client_id))
+    print_json(platform=platform)
+    print_line(f"platform {platform.name} is registered for {platform.issuer}")
 
 
 def list_platforms() -> None:
@@ -48,15 +48,15 @@ def list_platforms() -> None:
     from service.operations import platforms
 
     with open_installation() as (service, actor):
-        found = platforms.list_platforms(service, actor)
-    print_json(platforms=found)
-    if not found:
+        platform_list = platforms.list_platforms(service, actor)
+    print_json(platforms=platform_list)
+    if not platform_list:
         print_line("no learning platforms yet")
         return
-    listed = create_table("name", "issuer", "client", "deployments")
-    for each in found:
-        listed.add_row(each.name, each.issuer, each.client_id, ", ".join(each.deployments))
-    print_renderables(listed)
+    table = create_table("name", "issuer", "client", "deployments")
+    for platform in platform_list:
+        table.add_row(platform.name, platform.issuer, platform.client_id, ", ".join(platform.deployments))
+    print_renderables(table)
 
 
 def enrol_members(course: Course = DEFAULT_COURSE) -> None:
@@ -64,10 +64,10 @@ def enrol_members(course: Course = DEFAULT_COURSE) -> None:
     from service.operations import platforms
 
     with open_installation() as (service, actor):
-        enrolled = platforms.enrol_members(service, actor, courses.find(service, actor, course))
-    print_json(members=enrolled.members, refused=enrolled.refused)
-    print_line(f"{enrolled.members} of the platform's members are in {course}")
-    for reason in enrolled.refused:
+        enrolment = platforms.enrol_members(service, actor, courses.find(service, actor, course))
+    print_json(members=enrolment.members, refused=enrolment.refused)
+    print_line(f"{enrolment.members} of the platform's members are in {course}")
+    for reason in enrolment.refused:
         print_note(f"not enrolled: {reason}")
 
 
@@ -79,6 +79,6 @@ def send_marks(
     from service.operations import platforms
 
     with open_installation() as (service, actor):
-        sent = platforms.pass_back(service, actor, courses.find(service, actor, course), assignment)
-    print_json(assignment=assignment, sent=sent)
-    print_line(f"{assignment}: {sent} published marks sent")
+        sent_count = platforms.pass_back(service, actor, courses.find(service, actor, course), assignment)
+    print_json(assignment=assignment, sent=sent_count)
+    print_line(f"{assignment}: {sent_count} published marks sent")

@@ -51,9 +51,11 @@ def delete_student(
         raise UsageError("this cannot be undone; export a copy with export-student if needed, then use --for-good")
     with open_installation() as (service, actor):
         member = people.find(service, actor, DEFAULT_COURSE, student)
-        gone = privacy.erase_student(service, actor, member.course_id, member.enrolment_id)
-    print_json(submissions=gone.submissions, grades=gone.grades)
-    print_line(f"removed: {gone.submissions} submissions, {gone.grades} grades, and the student's identity")
+        removed_counts = privacy.erase_student(service, actor, member.course_id, member.enrolment_id)
+    print_json(submissions=removed_counts.submissions, grades=removed_counts.grades)
+    print_line(
+        f"removed: {removed_counts.submissions} submissions, {removed_counts.grades} grades, and the student's identity"
+    )
 
 
 def purge_course(
@@ -74,9 +76,13 @@ def purge_course(
         course_id = courses.find(service, actor, DEFAULT_COURSE)
         if archive is not None:
             print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
-        gone = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
-    counted = f"{gone.submissions} submissions, {gone.grades} grades, {gone.students} students"
-    print_json(removed=not only_count, archive=archive, **asdict(gone))
+        removed_counts = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
+    count_text = (
+        f"{removed_counts.submissions} submissions, {removed_counts.grades} grades, {removed_counts.students} students"
+    )
+    print_json(removed=not only_count, archive=archive, **asdict(removed_counts))
     print_line(
-        f"{counted} to remove; use --archive FILE or --for-good to remove them" if only_count else f"removed: {counted}"
+        f"{count_text} to remove; use --archive FILE or --for-good to remove them"
+        if only_count
+        else f"removed: {count_text}"
     )

@@ -58,22 +58,28 @@ from submissions.submission import Notebook
 
 
 def run_file(
-    path: Path, magic: MagicFlags, conditions: RunConditions, channel: ChannelFlags, kept: OutputFiles, *, unsafe: bool
+    path: Path,
+    magic: MagicFlags,
+    conditions: RunConditions,
+    channel: ChannelFlags,
+    output_files: OutputFiles,
+    *,
+    unsafe: bool,
 ) -> None:
     """Run a robot program or notebook, show the results, and save the requested files."""
-    if kept.diagrams is not None:
-        prepare_folder(kept.diagrams)
+    if output_files.diagrams is not None:
+        prepare_folder(output_files.diagrams)
     options = _build_options(magic, conditions, channel)
     if unsafe:
         warn_about_missing_sandbox()
-    read = read_runnable(path)
+    runnable = read_runnable(path)
     with TrialRunner(Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION)) as runner:
-        if isinstance(read, ProgramFile):
-            _run_program(read, options, conditions, kept, runner)
+        if isinstance(runnable, ProgramFile):
+            _run_program(runnable, options, conditions, output_files, runner)
         else:
-            for each in read.notes:
-                print_note(f"note: {each}")
-            _run_notebook(path, read.notebook, options, conditions, kept, runner)
+            for note in runnable.notes:
+                print_note(f"note: {note}")
+            _run_notebook(path, runnable.notebook, options, conditions, output_files, runner)
 
 
 def _build_options(magic: MagicFlags, conditions: RunConditions, channel: ChannelFlags) -> RunOptions:
@@ -97,77 +103,86 @@ def _run_notebook(
     notebook: Notebook,
     options: RunOptions,
     conditions: RunConditions,
-    kept: OutputFiles,
+    output_files: OutputFiles,
     runner: TrialRunner,
 ) -> None:
     if conditions.responder is not None:
         raise UsageError(f"{path.name} is a notebook and answers the robot itself; omit --responder")
     if conditions.second is not None:
         raise UsageError(f"{path.name} is a notebook and starts its robots itself; omit --second")
-    if kept.over is not None:
+    if output_files.over is not None:
         raise UsageError(f"{path.name} is a notebook and cannot have an overlay; omit --over")
     text = "\n".join(cell.source for cell in notebook.cells)
-    executed = run_notebook(notebook, read_neighbour_files(path, text), options, runner)
-    runs = [{"cell": run.cell, **_recording_to_json(run.recording)} for run in executed.runs]
-    print_json(output=executed.output, runs=runs, notes=executed.notes, stopped=executed.stopped)
-    _show_notebook(executed, _show_recording)
-    _show_diagrams(notebook, kept.diagrams)
-    if executed.runs:
-        _save_files(kept, executed.runs[-1].recording, path.name, options, collect_cell_sources(notebook))
+    executed_notebook = run_notebook(notebook, read_neighbour_files(path, text), options, runner)
+    runs = [{"cell": run.cell, **_recording_to_json(run.recording)} for run in executed_notebook.runs]
+    print_json(
+        output=executed_notebook.output, runs=runs, notes=executed_notebook.notes, stopped=executed_notebook.stopped
+    )
+    _show_notebook(executed_notebook, _show_recording)
+    _show_diagrams(notebook, output_files.diagrams)
+    if executed_notebook.runs:
+        _save_files(
+            output_files, executed_notebook.runs[-1].recording, path.name, options, collect_cell_sources(notebook)
+        )
 
 
 def _run_program(
-    program: ProgramFile, options: RunOptions, conditions: RunConditions, kept: OutputFiles, runner: TrialRunner
+    program: ProgramFile, options: RunOptions, conditions: RunConditions, output_files: OutputFiles, runner: TrialRunner
 ) -> None:
-    if kept.diagrams is not None:
+    if output_files.diagrams is not None:
         raise UsageError(f"{program.path.name} is not a notebook and has no diagrams; omit --diagrams")
-    ran = run_program(
+    run_result = run_program(
         program,
         options,
         runner,
         responder=None if conditions.responder is None else load_responder(conditions.responder, options.limits),
         second=None if conditions.second is None else read_program(conditions.second),
-        over=None if kept.over is None else _read_overlay_program(kept.over),
+        over=None if output_files.over is None else _read_overlay_program(output_files.over),
     )
-    for each in ran.notes:
-        print_note(f"note: {each}")
-    print_json(run=_recording_to_json(ran.recording), notes=ran.notes)
-    _show_recording(ran.recording)
-    others = NO_OVERLAY
-    if ran.over is not None and kept.over is not None:
-        others = OverlayTrials(kept.over.name, {0: _to_trial(ran.over, options.seed)})
-    answering = None if ran.spec.responder is None else ran.spec.responder.code
+    for note in run_result.notes:
+        print_note(f"note: {note}")
+    print_json(run=_recording_to_json(run_result.recording), notes=run_result.notes)
+    _show_recording(run_result.recording)
+    overlay_trials = NO_OVERLAY
+    if run_result.over is not None and output_files.over is not None:
+        overlay_trials = OverlayTrials(output_files.over.name, {0: _to_trial(run_result.over, options.seed)})
+    responder_code = None if run_result.spec.responder is None else run_result.spec.responder.code
     _save_files(
-        kept, ran.recording, program.path.name, options, collect_file_sources(ran.spec.program.code, answering), others
+        output_files,
+        run_result.recording,
+        program.path.name,
+        options,
+        collect_file_sources(run_result.spec.program.code, responder_code),
+        overlay_trials,
     )
 
 
 def _read_overlay_program(path: Path) -> ProgramFile:
     """Read a program that runs in the first program's world. Its ``%%sim_magic`` line is ignored."""
-    read = read_runnable(path)
-    if not isinstance(read, ProgramFile):
+    runnable = read_runnable(path)
+    if not isinstance(runnable, ProgramFile):
         raise UsageError(f"--over {path.name} is a notebook, expected a robot program")
-    return read
+    return runnable
 
 
 def _save_files(
-    kept: OutputFiles,
+    output_files: OutputFiles,
     recording: Recording,
     name: str,
     options: RunOptions,
     sources: Sources,
-    others: OverlayTrials = NO_OVERLAY,
+    overlay_trials: OverlayTrials = NO_OVERLAY,
 ) -> None:
     seed, floor = options.seed, options.floor
     pixels: dict[str, Pixels] = {} if floor is None else {floor.name: floor.pixels}
-    if kept.trace_file is not None:
-        _write_bytes(kept.trace_file, json.dumps(build_trace(recording)).encode())
-    if kept.picture is not None:
-        _write_bytes(kept.picture, _draw_picture(recording, name, seed, floor))
-    if kept.film is not None:
-        write_film(kept.film, _to_trial(recording, seed), pixels)
-    if kept.replay is not None:
-        write_replay(kept.replay, build_run_replay(recording, name, seed, sources, pixels, others))
+    if output_files.trace_file is not None:
+        _write_bytes(output_files.trace_file, json.dumps(build_trace(recording)).encode())
+    if output_files.picture is not None:
+        _write_bytes(output_files.picture, _draw_picture(recording, name, seed, floor))
+    if output_files.film is not None:
+        write_film(output_files.film, _to_trial(recording, seed), pixels)
+    if output_files.replay is not None:
+        write_replay(output_files.replay, build_run_replay(recording, name, seed, sources, pixels, overlay_trials))
 
 
 def _to_trial(recording: Recording, seed: int) -> TrialResult:
@@ -186,20 +201,21 @@ def _show_recording(recording: Recording) -> None:
     """Print the output, speech and messages of a run in order, and the outcome."""
     for t, text in build_transcript(recording):
         print_line(f"{t:8.2f} s  {to_display_text(text, 400)}")
-    for which, own in iterate_robots(recording):
-        end, whose = own.end, "" if own is recording else f"{which}: "
+    for robot, robot_recording in iterate_robots(recording):
+        end, owner = robot_recording.end, "" if robot_recording is recording else f"{robot}: "
         print_line(
-            f"{own.end_t:8.2f} s  {whose}end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading {end.heading:.1f} degrees; "
-            f"{own.verdict}"
+            f"{robot_recording.end_t:8.2f} s  {owner}end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading "
+            f"{end.heading:.1f} degrees; "
+            f"{robot_recording.verdict}"
         )
     for fault in collect_faults(recording):
-        whose = "" if fault.file else f" of the {fault.who}"
-        where = f" ({fault.place}{whose})" if fault.line is not None else ""
-        print(f"{fault.t:8.2f} s  {fault.verdict}: {to_display_text(fault.message, 400)}{where}", file=sys.stderr)
+        owner = "" if fault.file else f" of the {fault.who}"
+        location = f" ({fault.place}{owner})" if fault.line is not None else ""
+        print(f"{fault.t:8.2f} s  {fault.verdict}: {to_display_text(fault.message, 400)}{location}", file=sys.stderr)
         if fault.hint:
             print(f"            {fault.hint}", file=sys.stderr)
-    for each in recording.notes:
-        print_note(f"note: {to_display_text(each, 400)}")
+    for note in recording.notes:
+        print_note(f"note: {to_display_text(note, 400)}")
 
 
 def _recording_to_json(recording: Recording) -> dict[str, Any]:
@@ -218,26 +234,26 @@ def _recording_to_json(recording: Recording) -> dict[str, Any]:
     return {**build_trace(recording), "faults": faults}
 
 
-def _draw_picture(recording: Recording, name: str, seed: int, own: Floor | None) -> bytes:
-    driven_on = own if own is not None and own.name == recording.background else rebuild_floor(recording)
-    return render_png(draw_path(_to_trial(recording, seed), name, driven_on.pixels if driven_on else None))
+def _draw_picture(recording: Recording, name: str, seed: int, own_floor: Floor | None) -> bytes:
+    floor = own_floor if own_floor is not None and own_floor.name == recording.background else rebuild_floor(recording)
+    return render_png(draw_path(_to_trial(recording, seed), name, floor.pixels if floor else None))
 
 
-def _show_notebook(executed: ExecutedNotebook, show: Callable[[Recording], None]) -> None:
-    """Print the output of the cells and the skipped cells. ``show`` prints each robot run."""
-    shown = 0
-    for run in executed.runs:
-        _show_output(executed.output[shown : run.printed])
-        shown = run.printed
+def _show_notebook(executed_notebook: ExecutedNotebook, show_run: Callable[[Recording], None]) -> None:
+    """Print the output of the cells and the skipped cells. ``show_run`` prints each robot run."""
+    shown_length = 0
+    for run in executed_notebook.runs:
+        _show_output(executed_notebook.output[shown_length : run.printed])
+        shown_length = run.printed
         print_line(f"--- the robot, started by cell {run.cell} ---")
-        show(run.recording)
-    _show_output(executed.output[shown:])
-    for each in executed.notes:
-        print_note(f"note: {to_display_text(each, 400)}")
-    if executed.stopped is not None:
-        stopped = executed.stopped
+        show_run(run.recording)
+    _show_output(executed_notebook.output[shown_length:])
+    for note in executed_notebook.notes:
+        print_note(f"note: {to_display_text(note, 400)}")
+    if executed_notebook.stopped is not None:
+        stopped = executed_notebook.stopped
         print(f"{stopped.place}: {stopped.verdict}: {stopped.message}", file=sys.stderr)
-    if not executed.runs:
+    if not executed_notebook.runs:
         print_note("note: no robot was started: no cell begins with %%sim_magic_preloaded")
 
 
@@ -248,13 +264,13 @@ def _show_output(text: str) -> None:
 
 def _show_diagrams(notebook: Notebook, folder: Path | None) -> None:
     """Write the diagrams of the notebook's cells into ``folder``, if given, and report those that cannot be drawn."""
-    found = read_diagrams(notebook)
-    for problem in found.problems:
+    notebook_diagrams = read_diagrams(notebook)
+    for problem in notebook_diagrams.problems:
         print_note(f"note: {to_display_text(problem, 400)}")
     if folder is None:
-        if found.cells:
+        if notebook_diagrams.cells:
             print_note("note: the notebook has diagrams; --diagrams FOLDER draws them")
         return
-    for cell in found.cells:
+    for cell in notebook_diagrams.cells:
         figure = draw_diagram(cell.diagram, format_cell_title(cell), notebook.name, Highlights())
         print_note(f"diagram: {write_file(folder, f'cell-{cell.cell}.png', render_png(figure))}")

@@ -143,13 +143,13 @@ def run(
     panels: PanelFlags,
     conditions: RunConditions,
     channel: ChannelFlags,
-    kept: OutputFiles,
+    output_files: OutputFiles,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Run programs without a sandbox. For development only.")
     ] = False,
 ) -> None:
     """Run a robot program or a notebook in the simulator, with the flags of %sim_magic, and print its output."""
-    kept.check_options()
+    output_files.check_options()
     from service.commands.program_run import run_file
 
-    run_file(program, magic, conditions, channel, kept, unsafe=unsafe)
+    run_file(program, magic, conditions, channel, output_files, unsafe=unsafe)

@@ -41,20 +41,23 @@ def run_service(workers: int, host: str, port: int, *, serve: bool) -> None:
     control_group.divide_group()
     if serve:
         check_reach(host, settings)
-    with ExitStack() as held:
-        leave_note = held.enter_context(locked_home(settings))
-        listening = held.enter_context(listen(host, port)) if serve else None
-        where = "" if listening is None else f", {format_address(listening)}"
-        link = ""
-        leave_note(where)
+    with ExitStack() as stack:
+        write_note = stack.enter_context(locked_home(settings))
+        listening_socket = stack.enter_context(listen(host, port)) if serve else None
+        address_text = "" if listening_socket is None else f", {format_address(listening_socket)}"
+        link_text = ""
+        write_note(address_text)
         with Sandboxes() as sandboxes:
             # Check here to report the reason. Otherwise the user only sees that the worker stopped.
             sandboxes.check_isolation()
-        service, actor = held.enter_context(open_installation())
+        service, actor = stack.enter_context(open_installation())
         try:
-            if listening is not None:
-                link = f"; {_describe_sign_in(settings, _create_first_link(service, actor, format_address(listening)))}"
-            _supervise_services(settings, Supervisor(settings, service.store, workers, listening), where + link)
+            if listening_socket is not None:
+                link = _create_first_link(service, actor, format_address(listening_socket))
+                link_text = f"; {_describe_sign_in(settings, link)}"
+            _supervise_services(
+                settings, Supervisor(settings, service.store, workers, listening_socket), address_text + link_text
+            )
         except KeyboardInterrupt:
             return
 
@@ -65,29 +68,29 @@ def run_web_server(host: str, port: int) -> None:
     configure_logging(settings.log_level)
     check_reach(host, settings)
     database.upgrade(settings)
-    with listen(host, port) as listening:
-        print_event("serve.answers", f"robomark is running on {format_address(listening)}; press Ctrl-C to stop")
+    with listen(host, port) as listening_socket:
+        print_event("serve.answers", f"robomark is running on {format_address(listening_socket)}; press Ctrl-C to stop")
         try:
-            serve_on(settings, listening)
+            serve_on(settings, listening_socket)
         except KeyboardInterrupt:
             return
 
 
-def _supervise_services(settings: Settings, service: Supervisor, where: str) -> None:
+def _supervise_services(settings: Settings, service: Supervisor, address_text: str) -> None:
     with service:
         try:
             service.ensure()
             count = len(service.workers)
             workers = "1 worker" if count == 1 else f"{count} workers"
-            print_event("up.coming", f"robomark is starting in {settings.home}: {workers}{where}")
+            print_event("up.coming", f"robomark is starting in {settings.home}: {workers}{address_text}")
             _wait_until_ready(service)
             print_event("up.ready", f"ready: concurrency {count * settings.concurrency}; press Ctrl-C to stop")
             while True:
                 _restart_stopped(service)
                 time.sleep(_CHECK_SECONDS)
         except KeyboardInterrupt:
-            given_back = service.stop()
-            print_event("up.ended", f"stopped; running jobs returned to the queue: {given_back}")
+            returned_count = service.stop()
+            print_event("up.ended", f"stopped; running jobs returned to the queue: {returned_count}")
             raise
 
 
@@ -105,10 +108,10 @@ def _describe_sign_in(settings: Settings, link: str) -> str:
     return f"sign in with the link in {path}"
 
 
-def _create_first_link(service: Service, actor: Actor, listening_at: str) -> str:
+def _create_first_link(service: Service, actor: Actor, address: str) -> str:
     """Return a link that signs the user who started the service in once, as instructor and operator."""
     secret = sign_in_links.make_own_link(service, actor)
-    return f"{service.settings.public_url or listening_at}/sign-in/{secret}"
+    return f"{service.settings.public_url or address}/sign-in/{secret}"
 
 
 def _wait_until_ready(service: Supervisor) -> None:

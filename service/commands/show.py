@@ -53,7 +53,7 @@ def show(
         raise UsageError("--trial needs a film; expected --film too")
     with open_installation() as (service, actor):
         line = stored_grades.find(service, actor, grade)
-        others = None if over is None else _find_overlay_grade(service, actor, over, line)
+        overlay_grade = None if over is None else _find_overlay_grade(service, actor, over, line)
         if line.state is not JobState.DONE:
             print_json(job=line, grade=None)
             print_line(_describe_ungraded(line))
@@ -63,13 +63,15 @@ def show(
         from service.reports.formats.text import render_plain_text
         from service.reports.view import build_staff_view
 
-        words, submission = stored_grades.load_summary(service, actor, line.id)
-        told = build_staff_view(words)
-        print_json(job=line, grade=build_json_document(told, submission))
-        print_line(render_plain_text(told, submission).rstrip("\n"))
-        by = f"graded by {line.worker}" if line.copied_from is None else "not run"
+        summary, submission = stored_grades.load_summary(service, actor, line.id)
+        view = build_staff_view(summary)
+        print_json(job=line, grade=build_json_document(view, submission))
+        print_line(render_plain_text(view, submission).rstrip("\n"))
+        origin = f"graded by {line.worker}" if line.copied_from is None else "not run"
         print_line(
-            "; ".join([f"plots: {line.plots.value}", by, f"the student's attempt {line.attempt}", *list_remarks(line)])
+            "; ".join(
+                [f"plots: {line.plots.value}", origin, f"the student's attempt {line.attempt}", *list_remarks(line)]
+            )
         )
         if replay is None and film is None and output is None:
             return
@@ -77,29 +79,31 @@ def show(
         from service.report_files import write_grade_film, write_grade_replay, write_report
         from service.reports.output_files import build_file_stem
 
-        graded = stored_grades.load(service, actor, line.id)
-        spoken = load_language(language)
+        full_grade = stored_grades.load(service, actor, line.id)
+        report_language = load_language(language)
         if replay is not None:
-            write_grade_replay(service.store, line, graded, replay, others, spoken)
+            write_grade_replay(service.store, line, full_grade, replay, overlay_grade, report_language)
             print_note(f"replay: {replay}")
         if film is not None:
-            write_grade_film(service.store, line, graded, film, trial)
+            write_grade_film(service.store, line, full_grade, film, trial)
             print_note(f"film: {film}")
         if output is None:
             return
-        written = write_report(service.store, line, graded, output, build_file_stem(line.student), others, spoken)
-        print_note(f"report: {written.path}")
-        for name, data in written.plots.items():
+        report = write_report(
+            service.store, line, full_grade, output, build_file_stem(line.student), overlay_grade, report_language
+        )
+        print_note(f"report: {report.path}")
+        for name, data in report.plots.items():
             path = output / f"{line.id}-plot-{name}.png"
             with user_permissions():
                 path.write_bytes(data)
             print_note(f"plot: {path}")
 
 
-def _find_overlay_grade(service: Service, actor: Actor, over: str, line: JobLine) -> JobLine:
-    if over == _PREVIOUS:
+def _find_overlay_grade(service: Service, actor: Actor, overlay_id: str, line: JobLine) -> JobLine:
+    if overlay_id == _PREVIOUS:
         return stored_grades.find_previous(service, actor, line.id)
-    return stored_grades.find(service, actor, over)
+    return stored_grades.find(service, actor, overlay_id)
 
 
 def _describe_ungraded(line: JobLine) -> str:

@@ -21,23 +21,29 @@ _MOST_CAUSES = 5
 _MOST_NAMED = 10
 
 
-def build_statistics(found: Iterable[AssignmentStatistics]) -> Iterator[RenderableType]:
+def build_statistics(statistics: Iterable[AssignmentStatistics]) -> Iterator[RenderableType]:
     """Yield the texts and tables of each assignment, each after an empty line."""
-    for each in found:
-        spread = "" if each.spread is None else f", standard deviation {each.spread:.2f}"
-        yield (
-            f"\n{each.assignment}: {each.n} graded; mean {each.mean:.2f} of {each.max_marks.normalize():f}{spread}; "
-            f"lowest {each.lowest:.2f}, median {each.median:.2f}, highest {each.highest:.2f}"
+    for assignment_statistics in statistics:
+        spread = (
+            "" if assignment_statistics.spread is None else f", standard deviation {assignment_statistics.spread:.2f}"
         )
-        shares = create_table("criterion", "mean share of its marks", right=("mean share of its marks",))
-        for criterion in each.criteria:
-            shares.add_row(to_one_line(criterion.title), f"{criterion.mean_share:.0%}")
-        yield shares
-        if each.causes:
-            causes = create_table("most common causes", "students", "who", right=("students",))
-            for cause in each.causes[:_MOST_CAUSES]:
-                causes.add_row(to_one_line(cause.sentence), str(len(cause.students)), format_names(cause.students))
-            yield causes
+        yield (
+            f"\n{assignment_statistics.assignment}: {assignment_statistics.n} graded; mean "
+            f"{assignment_statistics.mean:.2f} of {assignment_statistics.max_marks.normalize():f}{spread}; "
+            f"lowest {assignment_statistics.lowest:.2f}, median {assignment_statistics.median:.2f}, highest "
+            f"{assignment_statistics.highest:.2f}"
+        )
+        criteria_table = create_table("criterion", "mean share of its marks", right=("mean share of its marks",))
+        for criterion in assignment_statistics.criteria:
+            criteria_table.add_row(to_one_line(criterion.title), f"{criterion.mean_share:.0%}")
+        yield criteria_table
+        if assignment_statistics.causes:
+            causes_table = create_table("most common causes", "students", "who", right=("students",))
+            for cause in assignment_statistics.causes[:_MOST_CAUSES]:
+                causes_table.add_row(
+                    to_one_line(cause.sentence), str(len(cause.students)), format_names(cause.students)
+                )
+            yield causes_table
 
 
 def format_names(students: tuple[str, ...]) -> str:

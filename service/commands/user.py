@@ -42,12 +42,13 @@ def add(
         added = courses.add_member(service, actor, MemberRequest(course, who, name, email, role, operator))
     member = added.member
     _print_link(service.settings, member.id, added.secret)
-    for other, instructor in added.elsewhere:
+    for other_course, instructor in added.elsewhere:
         print_note(
-            f"{_format_member(instructor)} is also an instructor of {other}. If this is the same person: robomark "
+            f"{_format_member(instructor)} is also an instructor of {other_course}. If this is the same person: "
+            "robomark "
             "user join "
             f"{member.id} "
-            f"--course {course} --same-as {instructor.id} --of {other}"
+            f"--course {course} --same-as {instructor.id} --of {other_course}"
         )
 
 
@@ -66,7 +67,7 @@ def links(
 ) -> None:
     """Print a new sign-in link for each student of a course. Earlier links expire."""
     with open_installation() as (service, actor):
-        made = sign_in_links.make_links(service, actor, courses.find(service, actor, course), days)
+        link_list = sign_in_links.make_links(service, actor, courses.find(service, actor, course), days)
     public = service.settings.public_url
     lines = [
         {
@@ -78,17 +79,17 @@ def links(
             "expires_at": each.expires_at,
             "reason": each.reason,
         }
-        for each in made
+        for each in link_list
     ]
     print_json(links=lines)
     if not lines:
         print_line("no students yet")
         return
-    listed = create_table("id", "name", "address", "link")
+    table = create_table("id", "name", "address", "link")
     for line in lines:
         link = line["url"] or line["path"] or line["reason"]
-        listed.add_row(*(str(each) for each in (line["id"], line["name"], line["email"], link)))
-    print_renderables(listed)
+        table.add_row(*(str(each) for each in (line["id"], line["name"], line["email"], link)))
+    print_renderables(table)
     if not public:
         print_note("add each link to the address that robomark up or serve prints")
 
@@ -108,8 +109,8 @@ def token(
             raise UsageError(f"--scope is {scope!r}, expected one of {', '.join(SCOPES)}")
     with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
-        asked = TokenForRequest(name or "command line", frozenset(scopes), days)
-        secret = people.issue_token(service, actor, member.enrolment_id, asked)
+        request = TokenForRequest(name or "command line", frozenset(scopes), days)
+        secret = people.issue_token(service, actor, member.enrolment_id, request)
     print_json(id=member.id, token=secret, scopes=sorted(scopes), days=days)
     print_line(secret)
 
@@ -124,9 +125,9 @@ def sign_out(
     """End all links, sessions and tokens of a person."""
     with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
-        ended = people.sign_out(service, actor, member.enrolment_id, release=release)
-    print_json(id=member.id, ended=ended)
-    print_line(f"{_format_member(member)} is signed out: {ended} links, sessions and tokens revoked")
+        revoked_count = people.sign_out(service, actor, member.enrolment_id, release=release)
+    print_json(id=member.id, ended=revoked_count)
+    print_line(f"{_format_member(member)} is signed out: {revoked_count} links, sessions and tokens revoked")
 
 
 def remove(who: PersonId, course: Course = DEFAULT_COURSE) -> None:
@@ -150,10 +151,10 @@ def join(
     """Join the accounts of one person in different courses, and sign both out."""
     with open_installation() as (service, actor):
         member = people.find(service, actor, course, who)
-        other = people.find(service, actor, of, same_as)
-        people.join(service, actor, JoinRequest(member.enrolment_id, other.enrolment_id, from_platform))
-    print_json(id=member.id, course=course, same_as=other.id, of=of)
-    print_line(f"{_format_member(member)} in {course} and {_format_member(other)} in {of} are now one person")
+        other_member = people.find(service, actor, of, same_as)
+        people.join(service, actor, JoinRequest(member.enrolment_id, other_member.enrolment_id, from_platform))
+    print_json(id=member.id, course=course, same_as=other_member.id, of=of)
+    print_line(f"{_format_member(member)} in {course} and {_format_member(other_member)} in {of} are now one person")
 
 
 def list_people(course: Course = DEFAULT_COURSE) -> None:
@@ -166,17 +167,19 @@ def list_people(course: Course = DEFAULT_COURSE) -> None:
             for each in members
         ]
     )
-    listed = create_table("id", "name", "address", "role")
-    for each in members:
-        listed.add_row(each.id, each.name, each.email, f"{each.role}{', operator' if each.operator else ''}")
-    print_renderables(listed)
+    table = create_table("id", "name", "address", "role")
+    for member in members:
+        table.add_row(member.id, member.name, member.email, f"{member.role}{', operator' if member.operator else ''}")
+    print_renderables(table)
 
 
-def _print_link(settings: Settings, who: str, secret: str) -> None:
+def _print_link(settings: Settings, person_id: str, secret: str) -> None:
     path = f"/sign-in/{secret}"
-    where = f"{settings.public_url}{path}" if settings.public_url else path
-    print_json(id=who, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
-    print_line(where if settings.public_url else f"{path}   (add this to the address that robomark up or serve prints)")
+    address = f"{settings.public_url}{path}" if settings.public_url else path
+    print_json(id=person_id, path=path, url=f"{settings.public_url}{path}" if settings.public_url else None)
+    print_line(
+        address if settings.public_url else f"{path}   (add this to the address that robomark up or serve prints)"
+    )
 
 
 def _format_member(member: Member) -> str:

@@ -46,49 +46,50 @@ def verify_grade(grade: str) -> None:
     """Repeat the grading with this id. Raises HostError for an unexpected difference."""
     with open_installation() as (service, actor):
         grading = stored_grades.load_grading(service, actor, grade)
-    stored, grading_request, secret = grading.grade, grading.request, _check_secret(grading)
-    again = _grade_again(grading_request, secret)
-    rows = list(zip(stored.trials, again.trials, strict=False))
-    marks = _compare_marks(stored, again, rows, grading_request.assignment.criteria)
-    cause = _find_cause(rows, marks, again, grading_request, secret)
-    differs = len(stored.trials) != len(again.trials) or "differs" in (
+    stored_grade, grading_request, secret = grading.grade, grading.request, _check_secret(grading)
+    regrade = _grade_again(grading_request, secret)
+    rows = list(zip(stored_grade.trials, regrade.trials, strict=False))
+    marks = _compare_marks(stored_grade, regrade, rows, grading_request.assignment.criteria)
+    cause = _find_cause(rows, marks, regrade, grading_request, secret)
+    has_differences = len(stored_grade.trials) != len(regrade.trials) or "differs" in (
         *marks,
         *itertools.starmap(_compare_trials, rows),
     )
-    same = not differs and cause is None
-    print_json(**_comparison_to_json(grading.job_id, stored, again, rows), same=same, cause=cause)
-    compared = create_table("scenario", "trial", "stored", "again", "")
-    for before, after in rows:
-        hashes = (before.recording.sha256[:16], after.recording.sha256[:16])
-        compared.add_row(before.scenario, str(before.index), *hashes, _compare_trials(before, after))
-    print_renderables(compared)
-    print_line(f"marks: {stored.marks} stored, {again.marks} regraded")
+    is_same = not has_differences and cause is None
+    print_json(**_comparison_to_json(grading.job_id, stored_grade, regrade, rows), same=is_same, cause=cause)
+    table = create_table("scenario", "trial", "stored", "again", "")
+    for stored_trial, new_trial in rows:
+        hashes = (stored_trial.recording.sha256[:16], new_trial.recording.sha256[:16])
+        table.add_row(stored_trial.scenario, str(stored_trial.index), *hashes, _compare_trials(stored_trial, new_trial))
+    print_renderables(table)
+    print_line(f"marks: {stored_grade.marks} stored, {regrade.marks} regraded")
     if grading.grader_sha256 != hash_grader():
         print_note(
-            f"graded by Robomark {stored.grader_version}, regraded by {GRADER_VERSION}; their code or libraries differ"
+            f"graded by Robomark {stored_grade.grader_version}, regraded by {GRADER_VERSION}; their code or "
+            "libraries differ"
         )
-    for result, compared_marks in zip(stored.criteria, marks, strict=False):
-        if compared_marks != "same":
-            print_note(f"the marks of {result.title} differ ({compared_marks})")
-    if not same:
-        reason = "" if cause is None else f": {_REASONS[cause] if differs else _LIMIT_REASON}"
+    for result, comparison in zip(stored_grade.criteria, marks, strict=False):
+        if comparison != "same":
+            print_note(f"the marks of {result.title} differ ({comparison})")
+    if not is_same:
+        reason = "" if cause is None else f": {_REASONS[cause] if has_differences else _LIMIT_REASON}"
         raise HostError(f"grade {grading.job_id} does not match its regrade{reason}")
     print_line(f"grade {grading.job_id} matches its regrade")
 
 
-def _grade_again(request: GradingRequest, secret: Secret, earlier: int = 0) -> Grade:
-    """Grade every trial of the submission in fresh processes, after grading it ``earlier`` times.
+def _grade_again(request: GradingRequest, secret: Secret, earlier_runs: int = 0) -> Grade:
+    """Grade every trial of the submission in fresh processes, after grading it ``earlier_runs`` times.
 
     In a new process namespace, process ids start again at 1. Only earlier processes make the ids differ.
     """
     with TrialRunner(spares=False) as runner:
-        for _ in range(earlier):
+        for _ in range(earlier_runs):
             grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
         return grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
 
 
 def _find_cause(
-    rows: Sequence[TrialPair], marks: Sequence[str], again: Grade, request: GradingRequest, secret: Secret
+    rows: Sequence[TrialPair], marks: Sequence[str], regrade: Grade, request: GradingRequest, secret: Secret
 ) -> str | None:
     """Return the cause of the differences, ``program`` or ``grader``, or None if nothing differs.
 
@@ -100,23 +101,25 @@ def _find_cause(
     criteria = [number for number, compared in enumerate(marks) if compared != "same"]
     if not trials and not criteria:
         return None
-    repeated = (_grade_again(request, secret), _grade_again(request, secret, earlier=1))
-    differs = any(
-        any(_compare_trials(again.trials[number], grade.trials[number]) == "differs" for number in trials)
-        or any(again.criteria[number].marks != grade.criteria[number].marks for number in criteria)
-        for grade in repeated
+    repeated_grades = (_grade_again(request, secret), _grade_again(request, secret, earlier_runs=1))
+    has_differences = any(
+        any(_compare_trials(regrade.trials[number], grade.trials[number]) == "differs" for number in trials)
+        or any(regrade.criteria[number].marks != grade.criteria[number].marks for number in criteria)
+        for grade in repeated_grades
     )
-    if differs:
+    if has_differences:
         return "program"
     return "grader" if trials or "differs" in marks else None
 
 
-def _comparison_to_json(job_id: str, stored: Grade, again: Grade, rows: Sequence[TrialPair]) -> dict[str, object]:
+def _comparison_to_json(
+    job_id: str, stored_grade: Grade, regrade: Grade, rows: Sequence[TrialPair]
+) -> dict[str, object]:
     """Return the JSON value for the comparison."""
     return {
         "grade": job_id,
-        "marks": stored.marks,
-        "marks_again": again.marks,
+        "marks": stored_grade.marks,
+        "marks_again": regrade.marks,
         "trials": [
             {
                 "scenario": before.scenario,
@@ -132,34 +135,36 @@ def _comparison_to_json(job_id: str, stored: Grade, again: Grade, rows: Sequence
 
 def _check_secret(grading: StoredGrading) -> Secret:
     """Return the secret that the grading used. Raises HostError if this installation has another secret."""
-    own, needed = grading.own_secret, grading.secret_sha256
-    if needed is None:
+    own_secret, needed_hash = grading.own_secret, grading.secret_sha256
+    if needed_hash is None:
         print_note("graded before this installation had a secret: regraded in the same worlds")
         return PUBLIC_SECRET
-    if needed != own.sha256:
+    if needed_hash != own_secret.sha256:
         raise HostError(
             f"grade {grading.job_id} cannot be verified with this secret: it was graded with "
-            f"{format_secret_name(needed)}, and "
-            f"the secret here is {own.name}; set ROBOMARK_SECRET to the original secret"
+            f"{format_secret_name(needed_hash)}, and "
+            f"the secret here is {own_secret.name}; set ROBOMARK_SECRET to the original secret"
         )
-    print_note(f"secret: {own.name}")
-    return own
+    print_note(f"secret: {own_secret.name}")
+    return own_secret
 
 
-def _compare_marks(stored: Grade, again: Grade, rows: Sequence[TrialPair], criteria: Sequence[Criterion]) -> list[str]:
+def _compare_marks(
+    stored_grade: Grade, regrade: Grade, rows: Sequence[TrialPair], criteria: Sequence[Criterion]
+) -> list[str]:
     """Return ``same``, ``cut by a limit`` or ``differs`` for each criterion.
 
     Marks may only differ if the criterion uses a trial that a limit cut short.
     """
     by_id = {criterion.id: criterion for criterion in criteria}
-    cut = {before.scenario for before, after in rows if _compare_trials(before, after) == "cut by a limit"}
+    cut_scenarios = {before.scenario for before, after in rows if _compare_trials(before, after) == "cut by a limit"}
     return [
         "same"
         if before.marks == after.marks
         else "cut by a limit"
-        if before.id in by_id and _is_affected(by_id[before.id], cut)
+        if before.id in by_id and _is_affected(by_id[before.id], cut_scenarios)
         else "differs"
-        for before, after in zip(stored.criteria, again.criteria, strict=True)
+        for before, after in zip(stored_grade.criteria, regrade.criteria, strict=True)
     ]
 
 
@@ -167,17 +172,22 @@ def _is_affected(criterion: Criterion, scenarios: AbstractSet[str]) -> bool:
     return criterion.judges_runs and bool(scenarios & set(criterion.scenarios or scenarios))
 
 
-def _compare_trials(before: TrialResult, after: TrialResult) -> str:
-    if before.recording.sha256 == after.recording.sha256:
+def _compare_trials(stored_trial: TrialResult, new_trial: TrialResult) -> str:
+    if stored_trial.recording.sha256 == new_trial.recording.sha256:
         return "same"
-    cut = before.verdict in _LIMIT_VERDICTS or after.verdict in _LIMIT_VERDICTS
-    return "cut by a limit" if cut and _has_same_beginning(before.recording, after.recording) else "differs"
+    is_cut = stored_trial.verdict in _LIMIT_VERDICTS or new_trial.verdict in _LIMIT_VERDICTS
+    return (
+        "cut by a limit" if is_cut and _has_same_beginning(stored_trial.recording, new_trial.recording) else "differs"
+    )
 
 
-def _has_same_beginning(before: Recording, after: Recording) -> bool:
+def _has_same_beginning(stored_recording: Recording, new_recording: Recording) -> bool:
     """Return whether the output of one recording is a prefix of the other's output."""
-    pairs = (*zip(before.spoken, after.spoken, strict=False), *zip(before.printed, after.printed, strict=False))
-    messages = zip(before.messages, after.messages, strict=False)
+    pairs = (
+        *zip(stored_recording.spoken, new_recording.spoken, strict=False),
+        *zip(stored_recording.printed, new_recording.printed, strict=False),
+    )
+    messages = zip(stored_recording.messages, new_recording.messages, strict=False)
     return all(one == other for one, other in pairs) and all(
         (one.t, one.sender, one.text) == (other.t, other.sender, other.text) for one, other in messages
     )

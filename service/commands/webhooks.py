@@ -34,9 +34,9 @@ def add(
     """Add a webhook to a course, and print the secret that signs its deliveries."""
     from service.operations import webhooks
 
-    chosen = _parse_events(events)
+    event_types = _parse_events(events)
     with open_installation() as (service, actor):
-        line, secret = webhooks.create(service, actor, courses.find(service, actor, course), url, chosen)
+        line, secret = webhooks.create(service, actor, courses.find(service, actor, course), url, event_types)
     print_json(webhook=line, secret=secret)
     print_line(secret)
     print_note(f"webhook {line.id} added; its secret is shown only once")
@@ -47,16 +47,16 @@ def list_webhooks(course: Course = DEFAULT_COURSE) -> None:
     from service.operations import webhooks
 
     with open_installation() as (service, actor):
-        found = webhooks.list_webhooks(service, actor, courses.find(service, actor, course))
-    print_json(webhooks=found)
-    if not found:
+        webhook_list = webhooks.list_webhooks(service, actor, courses.find(service, actor, course))
+    print_json(webhooks=webhook_list)
+    if not webhook_list:
         print_line("no webhooks yet")
         return
-    listed = create_table("id", "created", "events", "address")
-    for each in found:
-        created = each.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        listed.add_row(each.id, created, ", ".join(each.events), each.url)
-    print_renderables(listed)
+    table = create_table("id", "created", "events", "address")
+    for webhook in webhook_list:
+        created_text = webhook.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        table.add_row(webhook.id, created_text, ", ".join(webhook.events), webhook.url)
+    print_renderables(table)
 
 
 def remove(
@@ -80,25 +80,28 @@ def list_deliveries(
     from service.operations import webhooks
 
     with open_installation() as (service, actor):
-        found = webhooks.list_deliveries(service, actor, courses.find(service, actor, course), limit)
-    print_json(deliveries=found)
-    if not found:
+        deliveries = webhooks.list_deliveries(service, actor, courses.find(service, actor, course), limit)
+    print_json(deliveries=deliveries)
+    if not deliveries:
         print_line("no deliveries yet")
         return
-    listed = create_table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
-    for each in found:
-        made, delivered = (
-            "" if at is None else at.astimezone().strftime("%Y-%m-%d %H:%M") for at in (each.made_at, each.delivered_at)
+    table = create_table("made", "webhook", "event", "attempts", "delivered", "error", right=("attempts",))
+    for delivery in deliveries:
+        made_text, delivered_text = (
+            "" if at is None else at.astimezone().strftime("%Y-%m-%d %H:%M")
+            for at in (delivery.made_at, delivery.delivered_at)
         )
-        listed.add_row(made, each.webhook_id, each.event, str(each.attempts), delivered, each.error or "")
-    print_renderables(listed)
+        table.add_row(
+            made_text, delivery.webhook_id, delivery.event, str(delivery.attempts), delivered_text, delivery.error or ""
+        )
+    print_renderables(table)
 
 
 def _parse_events(names: Sequence[str]) -> list[WebhookEvent]:
     from service.operations.webhooks import WebhookEvent
 
-    known = [event.value for event in WebhookEvent]
+    event_names = [event.value for event in WebhookEvent]
     for name in names:
-        if name not in known:
-            raise UsageError(f"--event is {name!r}, expected one of {', '.join(known)}")
+        if name not in event_names:
+            raise UsageError(f"--event is {name!r}, expected one of {', '.join(event_names)}")
     return [WebhookEvent(name) for name in names]

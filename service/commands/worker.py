@@ -27,11 +27,11 @@ def worker(
     if unsafe:
         warn_about_missing_sandbox()
     if settings.broker_url:
-        status = run_worker(settings, unsafe=unsafe)
+        status = run_worker(settings, is_unsafe=unsafe)
     else:
         # Divide the control group before the broker starts: this is only possible while no other process is in it.
         control_group.divide_group()
         with EmbeddedBroker(settings) as broker:
-            status = run_worker(broker.settings, unsafe=unsafe)
+            status = run_worker(broker.settings, is_unsafe=unsafe)
     if status:
         raise HostError(f"the worker stopped with status {status}; see its log")

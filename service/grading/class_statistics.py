@@ -131,68 +131,68 @@ def to_marked_submission(grade: Grade) -> MarkedSubmission:
 
 def compute_statistics(submissions: Iterable[MarkedSubmission]) -> tuple[AssignmentStatistics, ...]:
     """Return the statistics of each assignment that has a submission, in order of name."""
-    of_assignment: dict[str, list[MarkedSubmission]] = {}
+    by_assignment: dict[str, list[MarkedSubmission]] = {}
     for submission in submissions:
-        of_assignment.setdefault(submission.assignment, []).append(submission)
-    return tuple(_compute_assignment_statistics(name, found) for name, found in sorted(of_assignment.items()))
+        by_assignment.setdefault(submission.assignment, []).append(submission)
+    return tuple(_compute_assignment_statistics(name, found) for name, found in sorted(by_assignment.items()))
 
 
-def _compute_assignment_statistics(assignment: str, found: Sequence[MarkedSubmission]) -> AssignmentStatistics:
-    marks = sorted(submission.marks for submission in found)
+def _compute_assignment_statistics(assignment: str, submissions: Sequence[MarkedSubmission]) -> AssignmentStatistics:
+    marks = sorted(submission.marks for submission in submissions)
     n = len(marks)
     mean = float(sum(marks)) / n
-    middle = marks[(n - 1) // 2 : n // 2 + 1]
+    middle_marks = marks[(n - 1) // 2 : n // 2 + 1]
     return AssignmentStatistics(
         assignment=assignment,
         n=n,
-        max_marks=max(submission.max_marks for submission in found),
+        max_marks=max(submission.max_marks for submission in submissions),
         mean=mean,
         spread=sqrt(sum((float(each) - mean) ** 2 for each in marks) / (n - 1)) if n > 1 else None,
         lowest=marks[0],
-        median=sum(middle, Decimal(0)) / len(middle),
+        median=sum(middle_marks, Decimal(0)) / len(middle_marks),
         highest=marks[-1],
-        criteria=_list_criterion_statistics(found),
-        causes=_collect_causes(found),
+        criteria=_list_criterion_statistics(submissions),
+        causes=_collect_causes(submissions),
     )
 
 
-def _list_criterion_statistics(found: Sequence[MarkedSubmission]) -> tuple[CriterionStatistics, ...]:
+def _list_criterion_statistics(submissions: Sequence[MarkedSubmission]) -> tuple[CriterionStatistics, ...]:
     """Return the criteria in the order of the submissions. Criteria worth no marks are left out."""
-    of_each: dict[str, list[MarkedCriterion]] = {}
-    for submission in found:
+    by_criterion: dict[str, list[MarkedCriterion]] = {}
+    for submission in submissions:
         for criterion in submission.criteria:
             if criterion.max_marks:
-                of_each.setdefault(criterion.id, []).append(criterion)
-    return tuple(_compute_criterion_statistics(own) for own in of_each.values())
+                by_criterion.setdefault(criterion.id, []).append(criterion)
+    return tuple(_compute_criterion_statistics(own) for own in by_criterion.values())
 
 
-def _compute_criterion_statistics(own: Sequence[MarkedCriterion]) -> CriterionStatistics:
-    shares = [float(each.marks / each.max_marks) for each in own]
+def _compute_criterion_statistics(criteria: Sequence[MarkedCriterion]) -> CriterionStatistics:
+    shares = [float(each.marks / each.max_marks) for each in criteria]
     return CriterionStatistics(
-        own[0].id,
-        own[0].title,
-        len(own),
-        sum(shares) / len(own),
-        sum(each.marks >= each.max_marks for each in own),
-        sum((each.max_marks - each.marks for each in own), Decimal(0)),
+        criteria[0].id,
+        criteria[0].title,
+        len(criteria),
+        sum(shares) / len(criteria),
+        sum(each.marks >= each.max_marks for each in criteria),
+        sum((each.max_marks - each.marks for each in criteria), Decimal(0)),
     )
 
 
-def _collect_causes(found: Sequence[MarkedSubmission]) -> tuple[Cause, ...]:
+def _collect_causes(submissions: Sequence[MarkedSubmission]) -> tuple[Cause, ...]:
     """Return the causes of lost marks: the fault that ended a submission, otherwise each criterion.
 
     For a submission that was still running at the end, both count, because that alone is not a fault.
     """
     students: dict[tuple[str, str], list[str]] = {}
-    for submission in found:
+    for submission in submissions:
         if submission.marks >= submission.max_marks:
             continue
         causes = []
         if submission.verdict != Verdict.FINISHED:
             causes.append((VERDICT_LABELS[Verdict(submission.verdict)], ""))
         if submission.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
-            lost = [each.title for each in submission.criteria if each.marks < each.max_marks]
-            causes += [(f"lost marks for: {title}", title) for title in lost]
+            lost_titles = [each.title for each in submission.criteria if each.marks < each.max_marks]
+            causes += [(f"lost marks for: {title}", title) for title in lost_titles]
         for cause in causes:
             students.setdefault(cause, []).append(submission.who)
     commonest = sorted(students.items(), key=lambda cause: (-len(cause[1]), cause[0]))

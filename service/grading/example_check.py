@@ -36,7 +36,7 @@ from submissions.assignment.reader import find_assignment
 class ExampleResult:
     """The result of one example. ``problems`` has one sentence for each difference from the expected result.
 
-    ``unwritten`` is the entry that ``expected.toml`` does not have yet.
+    ``missing_expectation`` is the entry that ``expected.toml`` does not have yet.
     """
 
     name: str
@@ -59,8 +59,8 @@ class ComparedMeasure:
     @property
     def is_close(self) -> bool:
         """Return whether the reference is close enough to the original. False if it has no such measure."""
-        near = self.original.within * max(abs(self.original.value), 1e-9)
-        return self.value is not None and abs(self.value - self.original.value) <= near + 1e-9
+        tolerance = self.original.within * max(abs(self.original.value), 1e-9)
+        return self.value is not None and abs(self.value - self.original.value) <= tolerance + 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +94,8 @@ class CheckedAssignment:
 
     def as_written(self) -> CheckedAssignment:
         """Return the result as it will be once ``expected.toml`` contains the missing expectations."""
-        told = self.missing_expectations
-        examples = (replace(each, problems=()) if each.name in told else each for each in self.examples)
+        new_expectations = self.missing_expectations
+        examples = (replace(each, problems=()) if each.name in new_expectations else each for each in self.examples)
         return replace(self, examples=tuple(examples))
 
 
@@ -106,18 +106,18 @@ def check_examples(name_or_path: str, *, runner: TrialRunner) -> CheckedAssignme
         AssignmentError: The assignment or its ``expected.toml`` is invalid.
     """
     assignment = find_assignment(name_or_path)
-    wanted = read_expected(name_or_path)
+    expected = read_expected(name_or_path)
     names = list_examples(name_or_path)
     results: list[ExampleResult] = []
     measures: tuple[ComparedMeasure, ...] = ()
     for name in names:
-        result, graded = _check_example(name_or_path, name, assignment, wanted.examples.get(name), runner)
+        result, example_grade = _check_example(name_or_path, name, assignment, expected.examples.get(name), runner)
         results.append(result)
-        if name == REFERENCE and graded is not None:
-            measures = tuple(_compare_measure(original, graded) for original in wanted.original)
-    missing = sorted(wanted.examples.keys() - set(names))
+        if name == REFERENCE and example_grade is not None:
+            measures = tuple(_compare_measure(original, example_grade) for original in expected.original)
+    missing_names = sorted(expected.examples.keys() - set(names))
     results += [
-        ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is not an example",)) for name in missing
+        ExampleResult(name, None, (), 0.0, (f"{name}: is expected, but is not an example",)) for name in missing_names
     ]
     return CheckedAssignment(assignment, tuple(results), measures)
 
@@ -133,37 +133,39 @@ def list_examples(name_or_path: str) -> tuple[str, ...]:
 
 
 def _check_example(
-    name_or_path: str, name: str, assignment: Assignment, wanted: ExpectedResult | None, runner: TrialRunner
+    name_or_path: str, name: str, assignment: Assignment, expected: ExpectedResult | None, runner: TrialRunner
 ) -> tuple[ExampleResult, Grade | None]:
-    begin = time.monotonic()
+    start = time.monotonic()
     try:
         submission = read_example(name_or_path, name)
-        graded = grade(submission, assignment, runner=runner)
+        example_grade = grade(submission, assignment, runner=runner)
     except UsageError as error:
-        return ExampleResult(name, None, (), time.monotonic() - begin, (f"{name}: {error}",)), None
-    seconds = time.monotonic() - begin
-    lost = tuple(result.id for result in graded.criteria if result.marks < result.max_marks)
+        return ExampleResult(name, None, (), time.monotonic() - start, (f"{name}: {error}",)), None
+    seconds = time.monotonic() - start
+    lost_ids = tuple(result.id for result in example_grade.criteria if result.marks < result.max_marks)
     problems = [
         f"{name}: {each}"
         for each in _compare_with_expectation(
-            graded, lost, wanted if wanted is not None else _build_default_expectation(name, assignment)
+            example_grade, lost_ids, expected if expected is not None else _build_default_expectation(name, assignment)
         )
     ]
-    if wanted is None and name != REFERENCE:
+    if expected is None and name != REFERENCE:
         problems.append(_describe_missing_table(name))
-    unwritten = _build_expectation(graded, lost) if wanted is None else None
-    marked = replace(to_marked_submission(graded), who=name)
-    return ExampleResult(name, graded.marks, lost, seconds, tuple(problems), unwritten, marked), graded
+    missing_expectation = _build_expectation(example_grade, lost_ids) if expected is None else None
+    marked_submission = replace(to_marked_submission(example_grade), who=name)
+    return ExampleResult(
+        name, example_grade.marks, lost_ids, seconds, tuple(problems), missing_expectation, marked_submission
+    ), example_grade
 
 
 def _describe_missing_table(name: str) -> str:
     return f"{name}: has no table in {EXPECTED} (check --write-expected writes its results)"
 
 
-def _build_expectation(graded: Grade, lost: tuple[str, ...]) -> ExpectedResult:
+def _build_expectation(example_grade: Grade, lost_ids: tuple[str, ...]) -> ExpectedResult:
     """Return the expectation that matches this grade."""
-    earns = {result.id: result.marks for result in graded.criteria if result.id in lost}
-    return ExpectedResult(marks=graded.marks, verdict=graded.verdict, loses=lost, earns=earns)
+    earns = {result.id: result.marks for result in example_grade.criteria if result.id in lost_ids}
+    return ExpectedResult(marks=example_grade.marks, verdict=example_grade.verdict, loses=lost_ids, earns=earns)
 
 
 def _build_default_expectation(name: str, assignment: Assignment) -> ExpectedResult | None:
@@ -171,47 +173,59 @@ def _build_default_expectation(name: str, assignment: Assignment) -> ExpectedRes
     return ExpectedResult(marks=assignment.max_marks) if name == REFERENCE else None
 
 
-def _compare_with_expectation(graded: Grade, lost: tuple[str, ...], wanted: ExpectedResult | None) -> list[str]:
-    found = [f"{result.id} could not be judged: {result.unjudged}" for result in graded.criteria if result.unjudged]
-    if wanted is None:
-        return found
-    earned = {result.id: result.marks for result in graded.criteria}
-    found += [
-        f'{EXPECTED} says it {verb} "{name}", expected the id of a criterion: {", ".join(sorted(earned))}'
-        for verb, names in (("loses", wanted.loses or ()), ("earns", wanted.earns))
+def _compare_with_expectation(
+    example_grade: Grade, lost_ids: tuple[str, ...], expected: ExpectedResult | None
+) -> list[str]:
+    problems = [
+        f"{result.id} could not be judged: {result.unjudged}" for result in example_grade.criteria if result.unjudged
+    ]
+    if expected is None:
+        return problems
+    earned_marks = {result.id: result.marks for result in example_grade.criteria}
+    problems += [
+        f'{EXPECTED} says it {verb} "{name}", expected the id of a criterion: {", ".join(sorted(earned_marks))}'
+        for verb, names in (("loses", expected.loses or ()), ("earns", expected.earns))
         for name in names
-        if name not in earned
+        if name not in earned_marks
     ]
-    found += [
-        f"got {earned[name]} marks for {name}, expected {marks}"
-        for name, marks in wanted.earns.items()
-        if name in earned and earned[name] != marks
+    problems += [
+        f"got {earned_marks[name]} marks for {name}, expected {marks}"
+        for name, marks in expected.earns.items()
+        if name in earned_marks and earned_marks[name] != marks
     ]
-    told = "\n".join(result.message for result in graded.criteria)
-    if graded.marks != wanted.marks:
-        found.append(f"got {graded.marks} marks, expected {wanted.marks}; {_describe_lost_marks(graded)}")
-    if graded.verdict != wanted.verdict:
-        found.append(f"ended as {graded.verdict}, expected {wanted.verdict}{_describe_fault(graded)}")
-    if wanted.loses is not None and set(lost) != set(wanted.loses):
-        found.append(f"lost marks in {', '.join(lost) or 'nothing'}, expected {', '.join(wanted.loses) or 'nothing'}")
-    found += [f'did not get the feedback "{phrase}", but {told}' for phrase in wanted.feedback if phrase not in told]
-    return found
+    messages = "\n".join(result.message for result in example_grade.criteria)
+    if example_grade.marks != expected.marks:
+        problems.append(
+            f"got {example_grade.marks} marks, expected {expected.marks}; {_describe_lost_marks(example_grade)}"
+        )
+    if example_grade.verdict != expected.verdict:
+        problems.append(
+            f"ended as {example_grade.verdict}, expected {expected.verdict}{_describe_fault(example_grade)}"
+        )
+    if expected.loses is not None and set(lost_ids) != set(expected.loses):
+        problems.append(
+            f"lost marks in {', '.join(lost_ids) or 'nothing'}, expected {', '.join(expected.loses) or 'nothing'}"
+        )
+    problems += [
+        f'did not get the feedback "{phrase}", but {messages}' for phrase in expected.feedback if phrase not in messages
+    ]
+    return problems
 
 
-def _describe_fault(graded: Grade) -> str:
+def _describe_fault(example_grade: Grade) -> str:
     """Return the first reported fault as a sentence part; empty if there is none."""
-    faults = [fault for trial in graded.trials for fault in collect_faults(trial.recording)]
+    faults = [fault for trial in example_grade.trials for fault in collect_faults(trial.recording)]
     return f"; {describe_fault(faults[0])}" if faults else ""
 
 
-def _describe_lost_marks(graded: Grade) -> str:
-    words = [f"{result.id}: {result.message}" for result in graded.criteria if result.marks < result.max_marks]
-    return " ".join(words) or "nothing was lost"
+def _describe_lost_marks(example_grade: Grade) -> str:
+    clauses = [f"{result.id}: {result.message}" for result in example_grade.criteria if result.marks < result.max_marks]
+    return " ".join(clauses) or "nothing was lost"
 
 
-def _compare_measure(original: OriginalMeasure, graded: Grade) -> ComparedMeasure:
+def _compare_measure(original: OriginalMeasure, example_grade: Grade) -> ComparedMeasure:
     """Compare the original with the first measure of that name, in the order of criteria and trials."""
-    for result in graded.criteria:
+    for result in example_grade.criteria:
         for evidence in result.evidence:
             for measure in evidence.measures:
                 if measure.name == original.measure:

@@ -74,8 +74,8 @@ def grade(
         Exception: Whatever ``observe`` raises.
     """
     if runner is None:
-        with TrialRunner() as own:
-            return grade(submission, assignment, secret=secret, observe=observe, runner=own)
+        with TrialRunner() as own_runner:
+            return grade(submission, assignment, secret=secret, observe=observe, runner=own_runner)
     plan = plan_run(submission, assignment, secret)
     runner.start_zygotes(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
@@ -118,14 +118,14 @@ def _run_trials(
     """Run the trials and return the results in the order of ``trials``, which may differ from the order of the runs."""
     if not all(map(_is_visible, trials)):
         runner.check_trial_isolation()
-    run: dict[int, TrialResult] = {}
+    results_by_number: dict[int, TrialResult] = {}
     repeats = FaultReplay()
     for number in _choose_run_order(trials, plan.child_seed):
         trial = trials[number]
         if not _is_visible(trial):
             # Visible trials run within their own limit, so that it does not reveal the number of hidden trials.
             meter.extend(_compute_job_limits(plan.assignment, len(trials)))
-        run[number] = TrialResult(
+        results_by_number[number] = TrialResult(
             trial.scenario.id,
             trial.index,
             trial.seed,
@@ -137,17 +137,17 @@ def _run_trials(
             trial.place,
         )
         watch.count_finished_trial()
-    return [run[number] for number in range(len(trials))]
+    return [results_by_number[number] for number in range(len(trials))]
 
 
 def _record_trial(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: FaultReplay) -> Recording:
     """Run one trial, without any child process that would only repeat an earlier fault."""
-    spec, obstacles, before = _build_trial_spec(trial, plan), plan.assignment.world.obstacles, meter.spent
+    spec, obstacles, spent_before = _build_trial_spec(trial, plan), plan.assignment.world.obstacles, meter.spent
     with runner.skipping_repeats(repeats):
         try:
             return repeats.record_trial(plan.trial.run(spec, obstacles, runner, meter))
         except ReplayDiverged:
-            meter.refund_since(before)
+            meter.refund_since(spent_before)
             repeats.record_divergence()
             return repeats.record_trial(plan.trial.run(spec, obstacles, runner, meter))
 
@@ -171,10 +171,11 @@ def _is_visible(trial: Trial) -> bool:
 
 def _build_spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     """Return notes on visible trials that ran without a child. Hidden trials are not counted."""
-    shown = [result.recording.notes for result in results if result.visibility == "visible"]
-    counts = [(note, sum(note in notes for notes in shown)) for note in REPLAY_NOTES.values()]
+    visible_notes = [result.recording.notes for result in results if result.visibility == "visible"]
+    counts = [(note, sum(note in notes for notes in visible_notes)) for note in REPLAY_NOTES.values()]
     return tuple(
-        f"{note.replace('this trial', f'{count} of {len(shown)} trials')}: two trials had ended with the same fault, "
+        f"{note.replace('this trial', f'{count} of {len(visible_notes)} trials')}: two trials had ended with the "
+        "same fault, "
         "and the program had the same input and uses no random numbers, so the result would be the same"
         for note, count in counts
         if count
@@ -251,5 +252,5 @@ def _build_partner_spec(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
     """Return the second robot, if there is one. A program from the assignment may run until the time limit."""
     if plan.second_program is None or trial.second_pose is None:
         return None
-    given = plan.assignment.parts.second_program in plan.assignment.given_parts
-    return PartnerSpec(plan.second_program, trial.second_pose, "p" in plan.second_flags.switches, given)
+    is_given = plan.assignment.parts.second_program in plan.assignment.given_parts
+    return PartnerSpec(plan.second_program, trial.second_pose, "p" in plan.second_flags.switches, is_given)

@@ -38,7 +38,7 @@ class GraderLocks:
 
 
 @contextmanager
-def _locked(path: Path, how: int, heartbeat: Callable[[], None]) -> Iterator[None]:
+def _locked(path: Path, operation: int, heartbeat: Callable[[], None]) -> Iterator[None]:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         file = path.open("a")
@@ -47,7 +47,7 @@ def _locked(path: Path, how: int, heartbeat: Callable[[], None]) -> Iterator[Non
     with file:
         while True:
             try:
-                fcntl.flock(file, how | fcntl.LOCK_NB)
+                fcntl.flock(file, operation | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
                 heartbeat()

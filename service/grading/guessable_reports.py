@@ -22,12 +22,12 @@ def find_guessable_reports(assignment: Assignment) -> Iterator[str]:
         if not isinstance(criterion, Reports):
             continue
         rows = _list_label_rows(assignment, criterion) if criterion.expected == "label" else criterion.expected
-        what = "label of the floor" if criterion.expected == "label" else "entry of expected"
+        answer_kind = "label of the floor" if criterion.expected == "label" else "entry of expected"
         counts = (sum(is_equivalent_row(row, other, criterion.leeway) for other in rows) for row in set(rows))
-        most = max(counts, default=0)
-        if len(rows) < 2 * most < 2 * len(rows):
+        max_count = max(counts, default=0)
+        if len(rows) < 2 * max_count < 2 * len(rows):
             yield (
-                f'criterion "{criterion.id}": one {what} fits {most} of the {len(rows)} poses, '
+                f'criterion "{criterion.id}": one {answer_kind} fits {max_count} of the {len(rows)} poses, '
                 "so a constant text passes there; choose poses of which at most half have the same answer"
             )
 

@@ -40,30 +40,34 @@ def hint_about_other_keys(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key missing from all answers, if they have a similar key or other keys in its place."""
     for criterion in clues.lost:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
-        wanted = path.rpartition(".")[2]
+        expected_key = path.rpartition(".")[2]
         for answer in clues.answers if path else ():
-            there = _list_sibling_keys(answer, path)
-            if there and not any(wanted in _list_sibling_keys(each, path) for each in clues.answers):
-                keys = " and ".join(map(quote_text, there[:3]))
-                line = _describe_key_line(there, clues) or describe_return_line(answer, clues, RETURN_LINE)
-                yield f"{line}: the answer has {keys}; expected the key {quote_text(wanted)}"
+            sibling_keys = _list_sibling_keys(answer, path)
+            if sibling_keys and not any(expected_key in _list_sibling_keys(each, path) for each in clues.answers):
+                keys = " and ".join(map(quote_text, sibling_keys[:3]))
+                line = _describe_key_line(sibling_keys, clues) or describe_return_line(answer, clues, RETURN_LINE)
+                yield f"{line}: the answer has {keys}; expected the key {quote_text(expected_key)}"
                 return
     yield from _hint_about_near_keys(clues)
 
 
 def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key that the assignment asks for and the robot reads, but no answer has."""
-    missing = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
-    key = next((found[1] for found in missing if found), "")
+    matches = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
+    key = next((found[1] for found in matches if found), "")
     if not key or f'"{key}"' not in clues.task or clues.missing == "responder":
         return
-    given = list(dict.fromkeys(each for answer in clues.answers for each in _KEY.findall(answer)))
-    near = difflib.get_close_matches(key.casefold(), [each.casefold() for each in given], 1, _MIN_SIMILARITY)
-    other = next((each for each in given if each.casefold() in near and f'"{each}"' not in clues.task), "")
-    line = _describe_key_line([other], clues) if other and key not in given else ""
+    answer_keys = list(dict.fromkeys(each for answer in clues.answers for each in _KEY.findall(answer)))
+    similar_keys = difflib.get_close_matches(
+        key.casefold(), [each.casefold() for each in answer_keys], 1, _MIN_SIMILARITY
+    )
+    similar_key = next(
+        (each for each in answer_keys if each.casefold() in similar_keys and f'"{each}"' not in clues.task), ""
+    )
+    line = _describe_key_line([similar_key], clues) if similar_key and key not in answer_keys else ""
     if line:
         yield (
-            f"{line} answers the key {quote_text(other)}; the assignment asks for {quote_text(key)}. Write "
+            f"{line} answers the key {quote_text(similar_key)}; the assignment asks for {quote_text(key)}. Write "
             f"{quote_text(key)}"
         )
 
@@ -73,19 +77,19 @@ def hint_about_none_answers(clues: Clues) -> Iterator[str]:
     answer = next((each for each in clues.answers if _NONE_VALUE.search(each)), None)
     if answer is None or not any(isinstance(each, Replies) for each in clues.lost):
         return
-    found = [
+    returns = [
         (listing, each)
         for listing in clues.responder_process_listings
         for each in listing.code.statements
         if each.tokens in (("return", "None"), ("return",))
     ]
-    if len(found) != 1:
+    if len(returns) != 1:
         return
-    listing, each = found[0]
-    condition = next((one for one in listing.code.list_enclosing(each) if one.keyword in ("if", "elif")), None)
+    listing, statement = returns[0]
+    condition = next((one for one in listing.code.list_enclosing(statement) if one.keyword in ("if", "elif")), None)
     if condition is not None:
         yield (
-            f"{listing.locate(each.line)} returns None, and the answer was {quote_text(answer)}. Check the "
+            f"{listing.locate(statement.line)} returns None, and the answer was {quote_text(answer)}. Check the "
             "condition in line "
             f"{condition.line}: {join_tokens(condition.condition)}"
         )
@@ -95,16 +99,16 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
     for criterion in clues.costliest_criteria[:1]:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
-        found = _VALUE.search(describe_first_failure(clues, criterion)) if path else None
-        where = _describe_key_line([path.rpartition(".")[2]], clues) if found else ""
-        if found is None or not where or not isinstance(criterion, Replies):
+        match = _VALUE.search(describe_first_failure(clues, criterion)) if path else None
+        location = _describe_key_line([path.rpartition(".")[2]], clues) if match else ""
+        if match is None or not location or not isinstance(criterion, Replies):
             continue
-        expected = next((each for each in criterion.expect.values() if str(each).endswith(found[1])), "")
-        advice = advise_on_difference(expected, found[1]) if expected and isinstance(expected, str) else ""
-        if found[1].startswith("["):
+        expected = next((each for each in criterion.expect.values() if str(each).endswith(match[1])), "")
+        advice = advise_on_difference(expected, match[1]) if expected and isinstance(expected, str) else ""
+        if match[1].startswith("["):
             advice = "It is a list or an array: take its first value with [0]"
         if advice:
-            yield f"{where} answers {quote_text(found[1])} at {path}. {advice}"
+            yield f"{location} answers {quote_text(match[1])} at {path}. {advice}"
             return
 
 
@@ -112,49 +116,50 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number of the answers that is too large or too small by the same amount in every trial."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
-        failed = [each.message for each in result.evidence if not each.passed] if result.id in reports else []
-        pairs = {found for each in failed if (found := _compute_shift(each)) is not None}
-        if len(failed) < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
+        failure_messages = [each.message for each in result.evidence if not each.passed] if result.id in reports else []
+        pairs = {found for each in failure_messages if (found := _compute_shift(each)) is not None}
+        if len(failure_messages) < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
             continue
         key, shift = pairs.pop()
-        where = _describe_key_line([key], clues)
-        if where and shift:
+        location = _describe_key_line([key], clues)
+        if location and shift:
             fix = f"add {shift}" if shift > 0 else f"subtract {-shift}"
             size = "small" if shift > 0 else "large"
             yield (
-                f"{where}: {quote_text(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: "
+                f"{location}: {quote_text(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: "
                 f"{fix}"
             )
             return
 
 
-def _compute_shift(told: str) -> tuple[str, int] | None:
+def _compute_shift(message: str) -> tuple[str, int] | None:
     """Return the key and expected minus actual value of an answer; None if they are no whole numbers."""
-    asked, answer = _AFTER.search(told), told.partition(JSON)[2].rpartition('"')[0]
-    value = _unwrap_object(JSON + answer).get(asked[2]) if asked is not None else None
-    if asked is None or not isinstance(value, int) or not asked[1].isdigit():
+    match, answer = _AFTER.search(message), message.partition(JSON)[2].rpartition('"')[0]
+    value = _unwrap_object(JSON + answer).get(match[2]) if match is not None else None
+    if match is None or not isinstance(value, int) or not match[1].isdigit():
         return None
-    return asked[2], int(asked[1]) - value
+    return match[2], int(match[1]) - value
 
 
 def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number that belongs to another key of the answer."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
-        asked = _AFTER.search(_join_messages(result)) if result.id in reports else None
-        for answer in clues.answers if asked else ():
+        match = _AFTER.search(_join_messages(result)) if result.id in reports else None
+        for answer in clues.answers if match else ():
             values = _unwrap_object(answer)
-            number, key = asked.groups() if asked else ("", "")
-            other = next((each for each, value in values.items() if each != key and str(value) == number), None)
+            number, key = match.groups() if match else ("", "")
+            other_key = next((each for each, value in values.items() if each != key and str(value) == number), None)
             if any(True for _ in hint_about_shifted_numbers(clues)):
                 return
-            if other is None or key not in values or str(values[key]) == number:
+            if other_key is None or key not in values or str(values[key]) == number:
                 continue
-            where = _describe_key_line([key], clues)
-            if where:
+            location = _describe_key_line([key], clues)
+            if location:
                 yield (
-                    f"{where}: {quote_text(key)} is {values[key]}; expected {number}, which {quote_text(other)} has. "
-                    f"Check the values of {quote_text(key)} and {quote_text(other)}: they may be swapped"
+                    f"{location}: {quote_text(key)} is {values[key]}; expected {number}, which "
+                    f"{quote_text(other_key)} has. "
+                    f"Check the values of {quote_text(key)} and {quote_text(other_key)}: they may be swapped"
                 )
                 return
 
@@ -164,17 +169,17 @@ def hint_about_text_numbers(clues: Clues) -> Iterator[str]:
     if not any(isinstance(each, Resends | FreshAnswers | Replies) for each in clues.lost):
         return
     for answer in clues.answers:
-        found = _TEXT_NUMBER.search(answer) if answer.startswith(JSON) else None
-        if found is None:
+        match = _TEXT_NUMBER.search(answer) if answer.startswith(JSON) else None
+        if match is None:
             continue
-        key = found[1]
-        compared = re.compile(rf"""\[["']{key}["']\]\s*(?:==|!=|<|>)(?!\s*["'])""")
-        place = next((each for each in clues.programs if each.find_line(compared)), None)
-        if place is not None:
+        key = match[1]
+        pattern = re.compile(rf"""\[["']{key}["']\]\s*(?:==|!=|<|>)(?!\s*["'])""")
+        listing = next((each for each in clues.programs if each.find_line(pattern)), None)
+        if listing is not None:
             yield (
                 f"{_describe_key_line([key], clues) or 'responder.py'} sends {quote_text(key)} as the text "
-                f"{quote_text(found[2])}, "
-                f"and {place.locate(place.find_line(compared))} compares it with a number. Write int(...) around "
+                f"{quote_text(match[2])}, "
+                f"and {listing.locate(listing.find_line(pattern))} compares it with a number. Write int(...) around "
                 "the text"
             )
             return
@@ -185,11 +190,11 @@ def hint_about_image_command(clues: Clues) -> Iterator[str]:
     if not any(isinstance(each, ImageLog) for each in clues.lost):
         return
     for text in clues.printed:
-        near = difflib.SequenceMatcher(None, text.casefold(), "image_data left").ratio()
-        if near >= 0.75 and not _IMAGE_LOG.match(text) and "logged..." not in text:
-            where = clues.describe_matching_line("program", re.compile(re.escape(text)))
+        similarity = difflib.SequenceMatcher(None, text.casefold(), "image_data left").ratio()
+        if similarity >= 0.75 and not _IMAGE_LOG.match(text) and "logged..." not in text:
+            location = clues.describe_matching_line("program", re.compile(re.escape(text)))
             side = next((each for each in ("right", "both") if each in text), "left")
-            yield f'{where} prints {quote_text(text)}, which logs no image; expected "image_data {side}"'
+            yield f'{location} prints {quote_text(text)}, which logs no image; expected "image_data {side}"'
             return
 
 
@@ -197,13 +202,13 @@ def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key required within a text, as in ``"'typ': 'PY'"``."""
     for criterion in clues.lost:
         texts = criterion.contains if isinstance(criterion, Replies) else ()
-        wanted = {key for text in texts for key in _KEY.findall(text)}
-        there = {key for answer in clues.answers for key in _KEY.findall(answer)}
-        for key in sorted(wanted - there):
-            near = difflib.get_close_matches(key, sorted(there - wanted), 1, _MIN_SIMILARITY)
-            line = _describe_key_line(near, clues) if near else ""
+        expected_keys = {key for text in texts for key in _KEY.findall(text)}
+        answer_keys = {key for answer in clues.answers for key in _KEY.findall(answer)}
+        for key in sorted(expected_keys - answer_keys):
+            similar_keys = difflib.get_close_matches(key, sorted(answer_keys - expected_keys), 1, _MIN_SIMILARITY)
+            line = _describe_key_line(similar_keys, clues) if similar_keys else ""
             if line:
-                yield f"{line} writes the key {quote_text(near[0])}; expected {quote_text(key)}"
+                yield f"{line} writes the key {quote_text(similar_keys[0])}; expected {quote_text(key)}"
                 return
 
 

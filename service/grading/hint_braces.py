@@ -20,7 +20,7 @@ def hint_about_braces(clues: Clues) -> Iterator[str]:
     if not clues.lost:
         return
     texts = (*clues.printed, *clues.spoken, *clues.sent, *clues.answers)
-    found = {each[0]: each[1] for text in texts for each in _BRACES.finditer(text)}
+    names_by_braces = {each[0]: each[1] for text in texts for each in _BRACES.finditer(text)}
     names = {
         name
         for listing in clues.texts
@@ -30,12 +30,12 @@ def hint_about_braces(clues: Clues) -> Iterator[str]:
     for listing in clues.texts:
         for statement in listing.code.statements:
             for token in statement.tokens:
-                braces = next((each for each, name in found.items() if each in token and name in names), None)
+                braces = next((each for each, name in names_by_braces.items() if each in token and name in names), None)
                 if braces is None or not _PLAIN_TEXT.match(token) or "format" in statement.tokens:
                     continue
-                fixed = f"f{token}" if len(token) <= _LONGEST else "f before the first quote"
+                fixed_text = f"f{token}" if len(token) <= _LONGEST else "f before the first quote"
                 yield (
                     f"{listing.locate(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
-                    f"and is not replaced by its value. Write {fixed}"
+                    f"and is not replaced by its value. Write {fixed_text}"
                 )
                 return

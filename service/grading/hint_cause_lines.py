@@ -31,35 +31,35 @@ _EXPECTED = re.compile(r"Expected ")
 def hint_about_cause_line(clues: Clues) -> Iterator[str]:
     """Yield the result of the criterion that lost most, prefixed with its line."""
     for criterion in clues.costliest_criteria[:1]:
-        found = describe_first_failure(clues, criterion)
-        if isinstance(criterion, Functions) and _EXPECTED.match(found):
-            yield hint_about_wrong_values(criterion.function, found)
+        message = describe_first_failure(clues, criterion)
+        if isinstance(criterion, Functions) and _EXPECTED.match(message):
+            yield hint_about_wrong_values(criterion.function, message)
             return
-        where = _describe_cause_line(criterion, found, clues) if _EXPECTED.match(found) else ""
-        if where:
-            yield f"{where}: {found[0].lower()}{found[1:].rstrip('.')}"
+        location = _describe_cause_line(criterion, message, clues) if _EXPECTED.match(message) else ""
+        if location:
+            yield f"{location}: {message[0].lower()}{message[1:].rstrip('.')}"
 
 
-def _describe_cause_line(criterion: Criterion, told: str, clues: Clues) -> str:
+def _describe_cause_line(criterion: Criterion, message: str, clues: Clues) -> str:
     """Return the position of the cause; empty if it is unknown or ambiguous."""
     if isinstance(criterion, Reports) and criterion.source == "reply":
-        key = _LABEL.search(told)
-        found = [
+        key = _LABEL.search(message)
+        locations = [
             clues.describe_matching_line("responder", re.compile(rf"""["']{re.escape(key[1])}["']""")) if key else ""
         ]
     elif isinstance(criterion, _TEXT_CRITERIA):
-        says = getattr(criterion, "source", "") == "speech" or criterion.check == "says"
-        names = _SPEECH_FUNCTIONS if says else _PRINT_FUNCTIONS | _SPEECH_FUNCTIONS
-        found = [
+        is_speech = getattr(criterion, "source", "") == "speech" or criterion.check == "says"
+        names = _SPEECH_FUNCTIONS if is_speech else _PRINT_FUNCTIONS | _SPEECH_FUNCTIONS
+        locations = [
             listing.locate(each.line)
             for listing, each in collect_statements(clues)
             if any(call.name.rpartition(".")[2] in names for call in each.calls)
         ]
-        texts = [text for text in (*clues.printed, *clues.spoken) if len(text) > 2 and text in told]
-        if len(found) > 1 and texts:
-            found = [describe_quoting_line(clues, "program", texts[-1])]
+        texts = [text for text in (*clues.printed, *clues.spoken) if len(text) > 2 and text in message]
+        if len(locations) > 1 and texts:
+            locations = [describe_quoting_line(clues, "program", texts[-1])]
     elif isinstance(criterion, DRIVING_CRITERIA + STOPPING_CRITERIA):
-        driving = [
+        drive_statements = [
             (listing, each)
             for listing, each in collect_statements(clues)
             if has_motor_call(each, LIMITED_MOVES)
@@ -70,10 +70,10 @@ def _describe_cause_line(criterion: Criterion, told: str, clues: Clues) -> str:
             for listing, each in collect_statements(clues)
             if each.keyword == "while" and any(token in PROPERTIES for token in each.condition)
         ]
-        found = [
+        locations = [
             listing.locate(each.line)
-            for listing, each in (loops if isinstance(criterion, STOPPING_CRITERIA) else driving)
+            for listing, each in (loops if isinstance(criterion, STOPPING_CRITERIA) else drive_statements)
         ]
     else:
         return ""
-    return found[0] if len(found) == 1 and found[0].startswith("line ") else ""
+    return locations[0] if len(locations) == 1 and locations[0].startswith("line ") else ""

@@ -132,11 +132,11 @@ class Clues:
     @property
     def should_use_queue(self) -> bool:
         """Return whether a criterion asks for JSON objects or the program reads the queue."""
-        asked = any(
+        is_json_required = any(
             getattr(each, "is_json", False) or getattr(each, "path", None) or getattr(each, "json_queue", False)
             for each in self.lost
         )
-        return asked or any(listing.find_line(_QUEUE) for listing in self.list_texts("program"))
+        return is_json_required or any(listing.find_line(_QUEUE) for listing in self.list_texts("program"))
 
     @property
     def costliest_criteria(self) -> list[Criterion]:
@@ -206,19 +206,19 @@ def collect_clues(
     submission: Submission, plan: RunPlan, trials: Sequence[TrialResult], results: Sequence[CriterionResult]
 ) -> Clues:
     """Collect the clues from what the student may see before publication."""
-    lost = {each.id for each in results if each.visibility == "visible" and each.marks < each.max_marks}
-    visible = (trial.recording for trial in trials if trial.visibility == "visible")
-    recordings = [each for first in visible for each in (first, first.partner) if each is not None]
-    seen = {index for index, trial in enumerate(trials) if trial.visibility == "visible"}
+    lost_ids = {each.id for each in results if each.visibility == "visible" and each.marks < each.max_marks}
+    visible_recordings = (trial.recording for trial in trials if trial.visibility == "visible")
+    recordings = [each for first in visible_recordings for each in (first, first.partner) if each is not None]
+    visible_indices = {index for index, trial in enumerate(trials) if trial.visibility == "visible"}
     return Clues(
         tuple(_build_listings(submission, plan.assignment.world.robots)),
         tuple(recordings),
-        tuple(each for each in plan.assignment.criteria if each.id in lost),
+        tuple(each for each in plan.assignment.criteria if each.id in lost_ids),
         tuple(submission.files),
         plan.missing,
         plan.flags.preamble,
         plan.collaborative,
-        tuple(_remove_hidden_evidence(each, seen) for each in results if each.id in lost),
+        tuple(_remove_hidden_evidence(each, visible_indices) for each in results if each.id in lost_ids),
         min((each.seconds for each in plan.assignment.scenarios if each.visibility == "visible"), default=0.0),
         plan.assignment.description,
         tuple(_build_extra_listings(submission)),
@@ -229,23 +229,23 @@ def collect_clues(
         plan.assignment.id,
         plan.assignment,
         tuple(
-            _remove_hidden_evidence(each, seen)
+            _remove_hidden_evidence(each, visible_indices)
             for each in results
             if each.visibility == "visible" and not each.max_marks
         ),
         tuple(trial for trial in trials if trial.visibility == "visible"),
-        {index: trials[index].recording for index in seen},
+        {index: trials[index].recording for index in visible_indices},
     )
 
 
-def _remove_hidden_evidence(result: CriterionResult, seen: Set[int]) -> CriterionResult:
+def _remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -> CriterionResult:
     """Return the result without anything that comes from hidden trials."""
-    evidence = tuple(each for each in result.evidence if each.trial in seen)
+    evidence = tuple(each for each in result.evidence if each.trial in visible_indices)
     if len(evidence) == len(result.evidence):
         return result
-    told = " ".join(each.message for each in evidence if not each.passed)
+    message = " ".join(each.message for each in evidence if not each.passed)
     accuracy = result.shown.accuracy if result.shown is not None else None
-    return replace(result, evidence=evidence, message=told, accuracy=accuracy, predictions=(), curves=(), shown=None)
+    return replace(result, evidence=evidence, message=message, accuracy=accuracy, predictions=(), curves=(), shown=None)
 
 
 def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
@@ -253,9 +253,9 @@ def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
         yield _build_listing("robot.py", "program", submission.program.text)
     if submission.responder is not None:
         yield _build_listing("responder.py", "responder", submission.responder.text)
-    second = submission.find_code(SECOND_PROGRAM) if robots == 2 else None
-    if second is not None:
-        yield _build_listing(SECOND_PROGRAM, "program", second.text)
+    second_program = submission.find_code(SECOND_PROGRAM) if robots == 2 else None
+    if second_program is not None:
+        yield _build_listing(SECOND_PROGRAM, "program", second_program.text)
     for cell in submission.notebook.cells if submission.notebook is not None else ():
         yield _build_listing(f"cell {cell.number}", None, cell.source)
 
@@ -272,12 +272,12 @@ def _build_listing(name: str, part: Part | None, text: str) -> Listing:
 
 
 def _collect_distinct_texts(texts: Iterator[str]) -> tuple[str, ...]:
-    found: dict[str, None] = {}
+    distinct_texts: dict[str, None] = {}
     for text in texts:
-        found[text[:LONGEST_TEXT]] = None
-        if len(found) == _MOST_TEXTS:
+        distinct_texts[text[:LONGEST_TEXT]] = None
+        if len(distinct_texts) == _MOST_TEXTS:
             break
-    return tuple(found)
+    return tuple(distinct_texts)
 
 
 def describe_first_failure(clues: Clues, criterion: Criterion) -> str:

@@ -92,12 +92,12 @@ class CodeStatements:
 
     def list_body(self, head: Statement) -> tuple[Statement, ...]:
         """Return the statements inside a loop, condition or function."""
-        found = []
-        for each in self.list_following(head):
-            if each.indent <= head.indent:
+        body = []
+        for statement in self.list_following(head):
+            if statement.indent <= head.indent:
                 break
-            found.append(each)
-        return tuple(found)
+            body.append(statement)
+        return tuple(body)
 
     def list_following(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the statements after this one."""
@@ -105,23 +105,23 @@ class CodeStatements:
 
     def find_next_outside(self, head: Statement) -> Statement | None:
         """Return the first statement after the body of ``head``, or None."""
-        below = self.list_following(head)[len(self.list_body(head)) :]
-        return below[0] if below else None
+        following = self.list_following(head)[len(self.list_body(head)) :]
+        return following[0] if following else None
 
     def list_enclosing(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the enclosing statements, the innermost first."""
-        found: list[Statement] = []
+        ancestors: list[Statement] = []
         parent = statement.parent
         while parent >= 0:
-            found.append(self.statements[parent])
-            parent = found[-1].parent
-        return tuple(found)
+            ancestors.append(self.statements[parent])
+            parent = ancestors[-1].parent
+        return tuple(ancestors)
 
     def list_enclosing_loops(self, statement: Statement) -> tuple[Statement, ...]:
         """Return the enclosing loops, including itself, innermost first, then loops that call its function."""
-        around = self.list_enclosing(statement)
-        loops = [each for each in (statement, *around) if each.keyword in LOOPS]
-        function = next((each.tokens[1] for each in around if each.keyword == "def" and len(each.tokens) > 1), "")
+        ancestors = self.list_enclosing(statement)
+        loops = [each for each in (statement, *ancestors) if each.keyword in LOOPS]
+        function = next((each.tokens[1] for each in ancestors if each.keyword == "def" and len(each.tokens) > 1), "")
         if function:
             callers = (each for each in self.statements if any(call.name == function for call in each.calls))
             loops += [outer for each in callers for outer in self.list_enclosing(each) if outer.keyword in LOOPS]
@@ -140,31 +140,33 @@ class CodeStatements:
         if len(tokens) != 1:
             return None
         if is_name(tokens[0]):
-            given = [each for each in self.statements if each.target == tokens[0]]
-            if len(given) != 1 or len(given[0].tokens) != 3 or is_name(given[0].tokens[2]):
+            assignments = [each for each in self.statements if each.target == tokens[0]]
+            if len(assignments) != 1 or len(assignments[0].tokens) != 3 or is_name(assignments[0].tokens[2]):
                 return None
-            tokens = given[0].tokens[2:]
+            tokens = assignments[0].tokens[2:]
         return _parse_number(tokens[0], sign)
 
 
 def read_code(lines: Sequence[str]) -> CodeStatements:
     """Split a text into statements, without magic lines. Stops where the tokenizer fails."""
     text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
-    found: list[Statement] = []
+    statements: list[Statement] = []
     open_blocks: list[Statement] = []
-    for number, each in enumerate(itertools.islice(_split_statements(text), _MOST_STATEMENTS)):
-        while open_blocks and open_blocks[-1].indent >= each.indent:
+    for number, statement in enumerate(itertools.islice(_split_statements(text), _MOST_STATEMENTS)):
+        while open_blocks and open_blocks[-1].indent >= statement.indent:
             open_blocks.pop()
-        found.append(replace(each, number=number, parent=open_blocks[-1].number if open_blocks else -1))
-        open_blocks.append(found[-1])
-    return CodeStatements(tuple(found))
+        statements.append(replace(statement, number=number, parent=open_blocks[-1].number if open_blocks else -1))
+        open_blocks.append(statements[-1])
+    return CodeStatements(tuple(statements))
 
 
 def guess_result_name(body: Sequence[Statement]) -> str:
     """Guess the name that a function without return should return: a fitted object, else the last assigned name."""
-    fitted = [call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")]
-    assigned = [each.target for each in body if each.target]
-    return next(iter((*fitted, *assigned[::-1])), "")
+    fitted_names = [
+        call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")
+    ]
+    assigned_names = [each.target for each in body if each.target]
+    return next(iter((*fitted_names, *assigned_names[::-1])), "")
 
 
 def is_name(token: str) -> bool:
@@ -175,20 +177,22 @@ def is_name(token: str) -> bool:
 def join_tokens(tokens: Sequence[str]) -> str:
     """Join the tokens into readable code."""
     text = ""
-    for before, token in zip(("", *tokens), tokens, strict=False):
-        tight = token in ".,:)]}" or before in "([{." or (token in "([" and (is_name(before) or before in (")", "]")))
-        text += token if tight or not before else f" {token}"
+    for previous, token in zip(("", *tokens), tokens, strict=False):
+        is_tight = (
+            token in ".,:)]}" or previous in "([{." or (token in "([" and (is_name(previous) or previous in (")", "]")))
+        )
+        text += token if is_tight or not previous else f" {token}"
     return text
 
 
 def compute_bracket_depths(tokens: Sequence[str]) -> list[int]:
     """Return the bracket depth of each token. A bracket has the depth outside it."""
-    found, depth = [], 0
+    depths, depth = [], 0
     for token in tokens:
         depth -= token in _CLOSING
-        found.append(depth)
+        depths.append(depth)
         depth += token in _OPENING
-    return found
+    return depths
 
 
 def _split_statements(text: str) -> Iterator[Statement]:
@@ -208,22 +212,22 @@ def _split_statements(text: str) -> Iterator[Statement]:
 def _split_logical_line(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
     """Yield the statements of one logical line, split at semicolons and before a body on the same line."""
     tokens = tokens[:_MOST_TOKENS]
-    first, words = tokens[0], [token.string for token in tokens]
-    indent, depth, begin = first.start[1], 0, 0
-    for place, word in enumerate(words):
-        depth += (word in _OPENING) - (word in _CLOSING)
-        ends = word == ";" or (word == ":" and words[begin] in _BLOCK_KEYWORDS and place + 1 < len(words))
-        if depth or not ends or words[begin] == "lambda":
+    first_token, strings = tokens[0], [token.string for token in tokens]
+    indent, depth, start = first_token.start[1], 0, 0
+    for index, string in enumerate(strings):
+        depth += (string in _OPENING) - (string in _CLOSING)
+        is_end = string == ";" or (string == ":" and strings[start] in _BLOCK_KEYWORDS and index + 1 < len(strings))
+        if depth or not is_end or strings[start] == "lambda":
             continue
-        yield _build_statement(tokens[begin : place + (word == ":")], indent)
-        indent, begin = indent + (word == ":"), place + 1
-    if begin < len(words):
-        yield _build_statement(tokens[begin:], indent)
+        yield _build_statement(tokens[start : index + (string == ":")], indent)
+        indent, start = indent + (string == ":"), index + 1
+    if start < len(strings):
+        yield _build_statement(tokens[start:], indent)
 
 
 def _build_statement(tokens: list[tokenize.TokenInfo], indent: int) -> Statement:
-    words, columns = (token.string for token in tokens), (token.start[1] for token in tokens)
-    return Statement(tokens[0].start[0], tokens[-1].end[0], indent, tuple(words), columns=tuple(columns))
+    strings, columns = (token.string for token in tokens), (token.start[1] for token in tokens)
+    return Statement(tokens[0].start[0], tokens[-1].end[0], indent, tuple(strings), columns=tuple(columns))
 
 
 def _collect_bound_names(tokens: tuple[str, ...]) -> Iterator[str]:
@@ -232,19 +236,19 @@ def _collect_bound_names(tokens: tuple[str, ...]) -> Iterator[str]:
             yield name
         case ("import" | "from", *rest):
             names = rest[rest.index("import") + 1 :] if tokens[0] == "from" and "import" in rest else rest
-            for place, name in enumerate(names):
-                renamed = place + 1 < len(names) and names[place + 1] == "as"
-                if is_name(name) and name != "as" and not renamed:
+            for index, name in enumerate(names):
+                is_renamed = index + 1 < len(names) and names[index + 1] == "as"
+                if is_name(name) and name != "as" and not is_renamed:
                     yield name
         case ("for", *rest):
             yield from filter(is_name, rest[: rest.index("in")] if "in" in rest else rest)
     depth = 0
-    for place, token in enumerate(tokens):
+    for index, token in enumerate(tokens):
         depth += (token in _OPENING) - (token in _CLOSING)
-        if token == ":=" and place:
-            yield tokens[place - 1]
+        if token == ":=" and index:
+            yield tokens[index - 1]
         if depth == 0 and token.endswith("=") and token not in ("==", "!=", "<=", ">=", ":="):
-            yield from _collect_targets(tokens[:place])
+            yield from _collect_targets(tokens[:index])
 
 
 def _collect_targets(tokens: Sequence[str]) -> Iterator[str]:
@@ -255,26 +259,26 @@ def _collect_targets(tokens: Sequence[str]) -> Iterator[str]:
 
 
 def _parse_calls(tokens: Sequence[str]) -> Iterator[CallInCode]:
-    for place, token in enumerate(tokens[:-1]):
-        if tokens[place + 1] != "(" or not is_name(token) or token in ("and", "or", "not", "in", "if", "while"):
+    for index, token in enumerate(tokens[:-1]):
+        if tokens[index + 1] != "(" or not is_name(token) or token in ("and", "or", "not", "in", "if", "while"):
             continue
-        begin = place
-        while begin >= 2 and tokens[begin - 1] == "." and is_name(tokens[begin - 2]):
-            begin -= 2
-        yield CallInCode("".join(tokens[begin : place + 1]), tuple(_split_arguments(tokens[place + 2 :])))
+        start = index
+        while start >= 2 and tokens[start - 1] == "." and is_name(tokens[start - 2]):
+            start -= 2
+        yield CallInCode("".join(tokens[start : index + 1]), tuple(_split_arguments(tokens[index + 2 :])))
 
 
 def _split_arguments(tokens: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    depth, begin = 0, 0
-    for place, token in enumerate(tokens):
+    depth, start = 0, 0
+    for index, token in enumerate(tokens):
         if token in _CLOSING and depth == 0:
-            if place > begin:
-                yield tuple(tokens[begin:place])
+            if index > start:
+                yield tuple(tokens[start:index])
             return
         depth += (token in _OPENING) - (token in _CLOSING)
         if token == "," and depth == 0:
-            yield tuple(tokens[begin:place])
-            begin = place + 1
+            yield tuple(tokens[start:index])
+            start = index + 1
 
 
 def _parse_number(token: str, sign: float) -> float | None:

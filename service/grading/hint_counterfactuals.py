@@ -58,26 +58,26 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
     if not failure:  # only hidden trials lost marks
         return
     trials = [each for each in clues.shown if not criterion.scenarios or each.scenario in criterion.scenarios]
-    unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
-    if not trials or unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements):
+    is_unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
+    if not trials or is_unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements):
         return
-    asked = [each for each in clues.definition.criteria if each.visibility == "visible"]
-    judged = [each for each in asked if isinstance(each, _PATH_CRITERIA)]
-    left = _MOST_TICKS
+    visible_criteria = [each for each in clues.definition.criteria if each.visibility == "visible"]
+    path_criteria = [each for each in visible_criteria if isinstance(each, _PATH_CRITERIA)]
+    remaining_ticks = _MOST_TICKS
     ticks = sum(len(each.recording.ticks) for each in trials)
     best: tuple[float, float, _Change, float] | None = None
     for change in list(_collect_changes(listing, trials))[:_MOST_LINES]:
-        passed = []
+        passing_factors = []
         for factor in (-1.0, *_FACTORS):
-            left -= ticks
-            if left < 0:
+            remaining_ticks -= ticks
+            if remaining_ticks < 0:
                 break
             if _has_full_marks(criterion, clues, _apply_change(trials, change, factor)):
-                passed.append(factor)
-        if not passed:
+                passing_factors.append(factor)
+        if not passing_factors:
             continue
-        factor = _choose_factor(passed)
-        total = sum(_compute_marks(each, clues, _apply_change(trials, change, factor)) for each in judged)
+        factor = _choose_factor(passing_factors)
+        total = sum(_compute_marks(each, clues, _apply_change(trials, change, factor)) for each in path_criteria)
         size = abs(math.log(abs(factor))) + (factor < 0)
         if best is None or (-total, size) < best[:2]:
             best = -total, size, change, factor
@@ -85,35 +85,39 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
         yield _describe_change(best[2], best[3], failure)
 
 
-def _choose_factor(passed: list[float]) -> float:
+def _choose_factor(passing_factors: list[float]) -> float:
     """Return the middle of the passing factors beside the nearest one, or -1 if only the opposite direction passes."""
-    ahead = sorted(each for each in passed if each > 0)
-    if not ahead:
+    positive_factors = sorted(each for each in passing_factors if each > 0)
+    if not positive_factors:
         return -1.0
-    nearest = min(ahead, key=lambda each: abs(math.log(each)))
-    low = high = nearest
-    while any(abs(each / low - 1 / 1.06) < 0.01 for each in ahead):
-        low /= 1.06
-    while any(abs(each / high - 1.06) < 0.01 for each in ahead):
-        high *= 1.06
+    nearest_factor = min(positive_factors, key=lambda each: abs(math.log(each)))
+    min_factor = max_factor = nearest_factor
+    while any(abs(each / min_factor - 1 / 1.06) < 0.01 for each in positive_factors):
+        min_factor /= 1.06
+    while any(abs(each / max_factor - 1.06) < 0.01 for each in positive_factors):
+        max_factor *= 1.06
     # Far from the borders of a wide range, but not farther from the student's number than necessary.
-    return min(math.sqrt(low * high), nearest * 1.2) if nearest > 1 else max(math.sqrt(low * high), nearest / 1.2)
+    return (
+        min(math.sqrt(min_factor * max_factor), nearest_factor * 1.2)
+        if nearest_factor > 1
+        else max(math.sqrt(min_factor * max_factor), nearest_factor / 1.2)
+    )
 
 
 def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_Change]:
     """Yield the lines that moved the robot: single calls in functions first, then each moving line."""
     code = listing.code
-    inner, outer = zip(*(_find_lines_at_ticks(each.recording) for each in trials), strict=True)
-    seen: set[bytes] = set()
-    for lines in (outer, inner):
+    inner_lines, outer_lines = zip(*(_find_lines_at_ticks(each.recording) for each in trials), strict=True)
+    known_keys: set[bytes] = set()
+    for lines in (outer_lines, inner_lines):
         for line in dict.fromkeys(int(each) for each in np.concatenate(lines)):
             statement = code.find_statement(line)
             ticks = tuple(each == line for each in lines)
             key = b"".join(each.tobytes() for each in ticks)
-            if statement is None or key in seen or not _has_moved(trials, ticks):
+            if statement is None or key in known_keys or not _has_moved(trials, ticks):
                 continue
-            seen.add(key)
-            if lines is inner and not (
+            known_keys.add(key)
+            if lines is inner_lines and not (
                 has_motor_call(statement, LIMITED_MOVES | CONTINUOUS_MOVES) or _is_sleep(statement)
             ):
                 continue
@@ -124,8 +128,8 @@ def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_C
 def _find_lines_at_ticks(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Return the innermost and the outermost line that ran during each tick."""
     starts = np.array([each.t for each in recording.places])
-    at = np.maximum(np.searchsorted(starts, recording.ticks.t - 1e-6, side="right") - 1, 0)
-    places = np.array([(each.line, each.outer) for each in recording.places])[at]
+    place_indices = np.maximum(np.searchsorted(starts, recording.ticks.t - 1e-6, side="right") - 1, 0)
+    places = np.array([(each.line, each.outer) for each in recording.places])[place_indices]
     return np.where(places[:, 1] > 0, places[:, 0], 0), places[:, 1]
 
 
@@ -138,9 +142,9 @@ def _compute_steps(recording: Recording) -> np.ndarray:
     """Return forward, sideways and turn of each tick, in the robot's frame at the tick's start. Shape (n, 3)."""
     start, ticks = recording.start, recording.ticks
     x, y = np.diff(ticks.x, prepend=start.x), np.diff(ticks.y, prepend=start.y)
-    before = np.radians(np.concatenate([[start.heading], ticks.heading[:-1]]))
+    headings = np.radians(np.concatenate([[start.heading], ticks.heading[:-1]]))
     turn = np.diff(ticks.heading, prepend=start.heading)
-    forward, sideways = x * np.cos(before) + y * np.sin(before), y * np.cos(before) - x * np.sin(before)
+    forward, sideways = x * np.cos(headings) + y * np.sin(headings), y * np.cos(headings) - x * np.sin(headings)
     return np.stack([forward, sideways, turn], axis=1)
 
 
@@ -151,21 +155,21 @@ def _apply_change(trials: list[TrialResult], change: _Change, factor: float) -> 
     ]
 
 
-def _scale_motion(recording: Recording, among: np.ndarray, factor: float) -> Recording:
+def _scale_motion(recording: Recording, selected_ticks: np.ndarray, factor: float) -> Recording:
     """Return the recording with the motion of some ticks scaled."""
     steps = _compute_steps(recording)
-    steps[among] *= factor
+    steps[selected_ticks] *= factor
     start, ticks = recording.start, recording.ticks
     heading = start.heading + np.cumsum(steps[:, 2])
-    before = np.radians(np.concatenate([[start.heading], heading[:-1]]))
-    x = start.x + np.cumsum(steps[:, 0] * np.cos(before) - steps[:, 1] * np.sin(before))
-    y = start.y + np.cumsum(steps[:, 0] * np.sin(before) + steps[:, 1] * np.cos(before))
-    scale = np.where(among, factor, 1.0)
+    headings_before = np.radians(np.concatenate([[start.heading], heading[:-1]]))
+    x = start.x + np.cumsum(steps[:, 0] * np.cos(headings_before) - steps[:, 1] * np.sin(headings_before))
+    y = start.y + np.cumsum(steps[:, 0] * np.sin(headings_before) + steps[:, 1] * np.cos(headings_before))
+    scale = np.where(selected_ticks, factor, 1.0)
     wheels = (np.cumsum(np.diff(each, prepend=0.0) * scale) for each in (ticks.left_position, ticks.right_position))
-    left, right = wheels
+    left_position, right_position = wheels
     end = Pose(float(x[-1]), float(y[-1]), float(heading[-1]))
-    moved = replace(ticks, x=x, y=y, heading=heading, left_position=left, right_position=right)
-    return replace(recording, ticks=moved, end=end)
+    scaled_ticks = replace(ticks, x=x, y=y, heading=heading, left_position=left_position, right_position=right_position)
+    return replace(recording, ticks=scaled_ticks, end=end)
 
 
 def _has_full_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> bool:
@@ -174,8 +178,8 @@ def _has_full_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult
 
 def _compute_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> float:
     """Return the marks of a criterion for changed trials; 0 if it looks at none of them."""
-    looked_at = any(not criterion.scenarios or each.scenario in criterion.scenarios for each in trials)
-    if clues.definition is None or not looked_at:
+    is_relevant = any(not criterion.scenarios or each.scenario in criterion.scenarios for each in trials)
+    if clues.definition is None or not is_relevant:
         return 0.0
     case = Case(clues.definition, trials, StaticAnalysis(), {})
     return float(JUDGES[type(criterion)].judge(criterion, case).marks)
@@ -187,12 +191,12 @@ def _is_sleep(statement: Statement) -> bool:
 
 def _list_numbers(listing: Listing, call: CallInCode) -> list[float]:
     """Return the numbers that a call is given."""
-    found = (listing.code.number(each) for each in call.arguments)
-    return [each for each in found if each is not None]
+    numbers = (listing.code.number(each) for each in call.arguments)
+    return [each for each in numbers if each is not None]
 
 
 def _describe_change(change: _Change, factor: float, failure: str) -> str:
-    where = change.listing.locate(change.statement.line)
+    location = change.listing.locate(change.statement.line)
     numbers = _list_numbers(change.listing, change.call) if change.call is not None else []
     name = change.call.name.rpartition(".")[2] if change.call is not None else ""
     amount = numbers[-1] if numbers and (len(numbers) == 1 or name in LIMITED_MOVES | {"sleep"}) else None
@@ -201,9 +205,9 @@ def _describe_change(change: _Change, factor: float, failure: str) -> str:
     elif amount:
         fix = f"Change {amount:g} to about {format_rounded(amount * factor)}"
     else:
-        more = "more" if factor > 1 else "less"
-        fix = f"Let the robot move about {factor:.2g} times as far or turn as much here, {more} than now"
-    return f"{where}: {failure[0].lower()}{failure[1:].rstrip('.')}. {fix}"
+        comparison = "more" if factor > 1 else "less"
+        fix = f"Let the robot move about {factor:.2g} times as far or turn as much here, {comparison} than now"
+    return f"{location}: {failure[0].lower()}{failure[1:].rstrip('.')}. {fix}"
 
 
 def format_rounded(number: float) -> str:

@@ -47,10 +47,10 @@ def _advise_on_numbers(expected: float, actual: float) -> str:
         size, fix = ("small", "add 1") if difference > 0 else ("large", "subtract 1")
         return f"It is 1 too {size}: check where the count begins and when it is increased, or {fix}"
     factor = expected / actual if actual else math.inf
-    for one in (factor, 1 / factor if factor else math.inf):
-        if 1.5 < one < 1000.5 and abs(one - round(one)) < 1e-6 * one:
-            size = "small: multiply" if one == factor else "large: divide"
-            return f"It is {round(one)} times too {size} by {round(one)}"
+    for ratio in (factor, 1 / factor if factor else math.inf):
+        if 1.5 < ratio < 1000.5 and abs(ratio - round(ratio)) < 1e-6 * ratio:
+            size = "small: multiply" if ratio == factor else "large: divide"
+            return f"It is {round(ratio)} times too {size} by {round(ratio)}"
     return ""
 
 

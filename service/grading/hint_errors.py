@@ -76,8 +76,8 @@ def hint_about_failed_cell(clues: Clues) -> Iterator[str]:
 
 def hint_about_errors(clues: Clues) -> Iterator[str]:
     """Yield the first error of each trial, with advice."""
-    firsts = (faults[0] for recording in clues.recordings if (faults := collect_faults(recording)))
-    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in firsts))[:_MOST_ERRORS]:
+    first_faults = (faults[0] for recording in clues.recordings if (faults := collect_faults(recording)))
+    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in first_faults))[:_MOST_ERRORS]:
         if fault.verdict not in _NON_ERROR_VERDICTS:
             yield from _hint_about_error(fault, clues)
 
@@ -88,17 +88,17 @@ def _hint_about_first_cell(clues: Clues) -> Iterator[str]:
 
 
 def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
-    where = describe_fault_line(fault, clues)
-    if not where:
+    location = describe_fault_line(fault, clues)
+    if not location:
         return
     name = UNDEFINED_NAME.match(fault.message)
     if name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
         yield (
-            f"{where} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
+            f"{location} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
             "or the name to be defined"
         )
         return
-    yield f"{where}: {describe_error(fault, clues)}"
+    yield f"{location}: {describe_error(fault, clues)}"
 
 
 def describe_error(fault: Fault, clues: Clues) -> str:
@@ -127,35 +127,37 @@ def _advise_on_null(fault: Fault, clues: Clues, *_: object) -> str:
     answer = next((text for text in clues.answers if _NULL.search(text)), None)
     if fault.who != "program" or "'NoneType' object" not in fault.message or answer is None:
         return ""
-    where = describe_return_line(answer, clues, RETURN_LINE)
-    return f"The responder answered {quote_text(answer)}: check why {where} is reached, and its condition."
+    location = describe_return_line(answer, clues, RETURN_LINE)
+    return f"The responder answered {quote_text(answer)}: check why {location} is reached, and its condition."
 
 
 def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
     """Return advice on an answer that never came because the channel lost the message."""
-    empty = "IndexError" in fault.message and statement is not None and statement.has_token("pyState", "messages")
-    lost = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
-    if fault.who != "program" or not empty or lost is None or clues.answers:
+    is_queue_empty = (
+        "IndexError" in fault.message and statement is not None and statement.has_token("pyState", "messages")
+    )
+    lost_message = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
+    if fault.who != "program" or not is_queue_empty or lost_message is None or clues.answers:
         return ""
-    why = f"{quote_text(lost.text)} was lost, because the robot {_OUT_OF_REACH[lost.lost]}"
-    ended = next((found for found, _ in describe_skipped_loops(clues)), "") if clues.is_stationary else ""
-    return f"No answer came: {why}.{ended and ' It never moved. In '}{ended}"
+    reason = f"{quote_text(lost_message.text)} was lost, because the robot {_OUT_OF_REACH[lost_message.lost]}"
+    skipped_loop = next((found for found, _ in describe_skipped_loops(clues)), "") if clues.is_stationary else ""
+    return f"No answer came: {reason}.{skipped_loop and ' It never moved. In '}{skipped_loop}"
 
 
 def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an import of an agent, of a robot-only module, or of an unavailable module."""
-    found = _NO_MODULE.match(fault.message)
-    if found is None:
+    match = _NO_MODULE.match(fault.message)
+    if match is None:
         return ""
-    name = found[1].partition(".")[0]
+    name = match[1].partition(".")[0]
     if name in clues.agents:
         return f"{name}.py is an agent, and agents are not imported: delete this line and call {name}(...)."
     if name.startswith("ev3dev2") and fault.who == "responder":
         return f"Only a robot program can import {name}: delete this line."
     if name in UNAVAILABLE_MODULES:
         return f"{name} is not available here: delete this line and what uses it."
-    near = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
-    return f"Did you mean {near[0]}?" if near and not fault.hint else ""
+    similar_modules = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
+    return f"Did you mean {similar_modules[0]}?" if similar_modules and not fault.hint else ""
 
 
 def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -173,11 +175,11 @@ def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: 
     """Return advice on a property with three values that is unpacked into fewer names."""
     if statement is None or not _UNPACKED.match(fault.message) or "=" not in statement.tokens:
         return ""
-    place = statement.tokens.index("=")
+    equals_index = statement.tokens.index("=")
     value = statement.tokens[-1]
     if value == "rgb":
-        return f"rgb has three values: write red, green, blue = {join_tokens(statement.tokens[place + 1 :])}."
-    names = sum(token == "," for token in statement.tokens[:place]) + 1
+        return f"rgb has three values: write red, green, blue = {join_tokens(statement.tokens[equals_index + 1 :])}."
+    names = sum(token == "," for token in statement.tokens[:equals_index]) + 1
     return f"There are {names} names to the left of =: write as many names as there are values."
 
 
@@ -186,9 +188,14 @@ def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statem
     if statement is None or "could not convert string to float" not in fault.message:
         return ""
     for call in statement.calls:
-        plain = [join_tokens(each) for each in call.arguments if "=" not in each]
-        if call.name.endswith(".fit") and len(plain) == 2 and _LABELS.search(plain[0]) and not _LABELS.search(plain[1]):
-            return f"fit takes the images first and then the labels: write {call.name}({plain[1]}, {plain[0]})."
+        arguments = [join_tokens(each) for each in call.arguments if "=" not in each]
+        if (
+            call.name.endswith(".fit")
+            and len(arguments) == 2
+            and _LABELS.search(arguments[0])
+            and not _LABELS.search(arguments[1])
+        ):
+            return f"fit takes the images first and then the labels: write {call.name}({arguments[1]}, {arguments[0]})."
     return ""
 
 
@@ -201,10 +208,10 @@ def _advise_on_steering(fault: Fault, _: Clues, __: Listing | None, statement: S
 
 def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a file that was not submitted, or is named with a folder."""
-    found = _NO_FILE.search(fault.message)
-    if found:
-        file = PurePosixPath(found[1].replace("\\", "/")).name
-        if file in clues.files or file != found[1]:
+    match = _NO_FILE.search(fault.message)
+    if match:
+        file = PurePosixPath(match[1].replace("\\", "/")).name
+        if file in clues.files or file != match[1]:
             return (
                 f"Files lie beside your program: submit {sanitise_name(file)} with it and write "
                 f'"{sanitise_name(file)}", no folder.'
@@ -223,14 +230,14 @@ def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None,
 
 def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on a key that is similar to one in the messages or the submission."""
-    found = _NO_KEY.match(fault.message)
-    if not found:
+    match = _NO_KEY.match(fault.message)
+    if not match:
         return ""
     texts = (*clues.answers, *clues.sent, *(line for each in clues.listings for line in each.lines))
-    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != found[1]))[:200]
-    near = difflib.get_close_matches(found[1], keys, 1, _NEAR_KEY)
-    if near:
-        return f'Did you mean "{near[0]}"?'
+    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != match[1]))[:200]
+    similar_keys = difflib.get_close_matches(match[1], keys, 1, _NEAR_KEY)
+    if similar_keys:
+        return f'Did you mean "{similar_keys[0]}"?'
     answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
     if fault.who == "program" and answer:
         return f"Nothing is stored under this key. The responder answered {quote_text(answer)}: use one of its keys."
@@ -239,17 +246,18 @@ def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
 
 def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a call of something that is not callable: a property, or an overwritten name."""
-    found = _NOT_CALLABLE.match(fault.message)
-    if found is None or statement is None or listing is None:
+    match = _NOT_CALLABLE.match(fault.message)
+    if match is None or statement is None or listing is None:
         return ""
     for call in statement.calls:
         name = call.name.rpartition(".")[2]
         if name in PROPERTIES and "." in call.name:
             return f"{name} is a property: write it without brackets, {call.name}."
-        given = next((each for each in listing.code.statements if each.target == call.name), None)
-        if given is not None:
+        assignment = next((each for each in listing.code.statements if each.target == call.name), None)
+        if assignment is not None:
             return (
-                f"Line {given.line} gives {call.name} another value: {join_tokens(given.tokens)}. Choose another name "
+                f"Line {assignment.line} gives {call.name} another value: {join_tokens(assignment.tokens)}. "
+                "Choose another name "
                 "there."
             )
     return "A sign such as * or a comma is missing before the bracket, or the name stands for a value."
@@ -257,10 +265,10 @@ def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, stateme
 
 def _advise_on_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return the usage of a call that has too few values."""
-    found = _TOO_FEW.match(fault.message)
-    if found is None or statement is None:
+    match = _TOO_FEW.match(fault.message)
+    if match is None or statement is None:
         return ""
-    call = next((each for each in statement.calls if each.name.rpartition(".")[2] == found[1]), None)
+    call = next((each for each in statement.calls if each.name.rpartition(".")[2] == match[1]), None)
     usage = USAGE.get(call.name) if call is not None else None
     return f"Write {usage}." if usage else ""
 
@@ -273,8 +281,8 @@ def _advise_from_hint(fault: Fault, *_: object) -> str:
 def _advise_from_table(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     code = "" if listing is None else "".join(listing.lines[(fault.line or 0) - 1 : fault.line])
     text = f"{fault.message}\n{code}"
-    found = ((error.search(text), advice) for error, advice in ADVICE)
-    return next((match.expand(advice) for match, advice in found if match), "")
+    matches = ((error.search(text), advice) for error, advice in ADVICE)
+    return next((match.expand(advice) for match, advice in matches if match), "")
 
 
 _Adviser = Callable[[Fault, Clues, Listing | None, Statement | None], str]

@@ -55,7 +55,7 @@ class _Failure:
 def hint_about_failure_line(clues: Clues) -> Iterator[str]:
     """Yield what to change in the line that ran when the criterion that lost most failed."""
     for criterion in clues.costliest_criteria[:2]:
-        moment = _find_failure(clues, criterion)
+        failure = _find_failure(clues, criterion)
         for rule in (
             _hint_about_duration,
             _hint_about_unwanted_text,
@@ -65,7 +65,7 @@ def hint_about_failure_line(clues: Clues) -> Iterator[str]:
             _hint_about_loop_end,
             _hint_about_steering,
         ):
-            hint = rule(moment) if moment is not None else ""
+            hint = rule(failure) if failure is not None else ""
             if hint:
                 yield hint
                 return
@@ -77,13 +77,13 @@ def hint_about_unentered_loop(clues: Clues) -> Iterator[str]:
     listing = next(iter(clues.programs), None)
     if not clues.lost or listing is None or len(clues.recordings_by_trial) != len(clues.recordings) or not runs:
         return
-    ran = {place.line for each in runs for place in each.places if place.outer}
-    for each in listing.code.statements:
-        body = listing.code.list_body(each) if each.keyword == "while" and not each.parent >= 0 else ()
-        acting = [one for one in body if any(_has_effect(call) for call in one.calls)]
-        if acting and not any(one.line in ran for one in body):
+    executed_lines = {place.line for each in runs for place in each.places if place.outer}
+    for statement in listing.code.statements:
+        body = listing.code.list_body(statement) if statement.keyword == "while" and not statement.parent >= 0 else ()
+        acting_statements = [one for one in body if any(_has_effect(call) for call in one.calls)]
+        if acting_statements and not any(one.line in executed_lines for one in body):
             yield (
-                f"{listing.locate(each.line)}: the loop never ran, because {join_tokens(each.condition)} was "
+                f"{listing.locate(statement.line)}: the loop never ran, because {join_tokens(statement.condition)} was "
                 "false from the "
                 "start. Check the sign of the comparison and the values in it"
             )
@@ -96,12 +96,12 @@ def _has_effect(call: CallInCode) -> bool:
 
 def _find_failure(clues: Clues, criterion: Criterion) -> _Failure | None:
     result = next(each for each in clues.results if each.id == criterion.id)
-    failed = next(
+    failed_evidence = next(
         (each for each in result.evidence if not each.passed and each.trial in clues.recordings_by_trial), None
     )
-    if failed is None or not failed.message:
+    if failed_evidence is None or not failed_evidence.message:
         return None
-    recording = clues.recordings_by_trial[failed.trial]
+    recording = clues.recordings_by_trial[failed_evidence.trial]
     programs = list(clues.programs)
     if criterion.robot == 2 and recording.partner is not None:
         recording, programs = recording.partner, programs[1:] or programs
@@ -109,7 +109,12 @@ def _find_failure(clues: Clues, criterion: Criterion) -> _Failure | None:
         return None
     listing = programs[0] if clues.marked_cell is None else _find_cell(programs, clues.marked_cell)
     return _Failure(
-        criterion, failed.message, recording, listing, _list_lines_before(recording, listing, failed), clues.task
+        criterion,
+        failed_evidence.message,
+        recording,
+        listing,
+        _list_lines_before(recording, listing, failed_evidence),
+        clues.task,
     )
 
 
@@ -117,32 +122,34 @@ def _find_cell(programs: Sequence[Listing], number: int) -> Listing:
     return next((each for each in programs if each.name == f"cell {number}"), programs[0])
 
 
-def _list_lines_before(recording: Recording, listing: Listing, failed: Evidence) -> list[Statement]:
+def _list_lines_before(recording: Recording, listing: Listing, evidence: Evidence) -> list[Statement]:
     """Return the different statements that ran until the failure, the last one first."""
-    until = recording.end_t if failed.t is None else failed.t
-    found: dict[int, Statement] = {}
-    for place in reversed(recording.places):
-        statement = listing.code.find_statement(place.line) if place.outer and place.t <= until + 1e-6 else None
-        if statement is not None and statement.line not in found:
-            found[statement.line] = statement
-    return list(found.values())
+    end_time = recording.end_t if evidence.t is None else evidence.t
+    statements: dict[int, Statement] = {}
+    for position in reversed(recording.places):
+        statement = (
+            listing.code.find_statement(position.line) if position.outer and position.t <= end_time + 1e-6 else None
+        )
+        if statement is not None and statement.line not in statements:
+            statements[statement.line] = statement
+    return list(statements.values())
 
 
-def _hint_about_duration(moment: _Failure) -> str:
+def _hint_about_duration(failure: _Failure) -> str:
     """Return a hint on a move that lasted too long or too briefly, with the number of seconds to write."""
-    took = _DURATION.search(moment.found)
-    asked = moment.criterion.moves if isinstance(moment.criterion, Moves) else ()
-    ranges = [each.seconds for each in asked if each.seconds]
-    moving = next((each for each in moment.lines if has_motor_call(each, LIMITED_MOVES)), None)
-    if took is None or len(ranges) != 1 or moving is None:
+    duration_match = _DURATION.search(failure.found)
+    required_moves = failure.criterion.moves if isinstance(failure.criterion, Moves) else ()
+    ranges = [each.seconds for each in required_moves if each.seconds]
+    move_statement = next((each for each in failure.lines if has_motor_call(each, LIMITED_MOVES)), None)
+    if duration_match is None or len(ranges) != 1 or move_statement is None:
         return ""
-    least, most = ranges[0]
-    seconds = float(took[1])
-    if least <= seconds <= most or not seconds:
+    minimum, maximum = ranges[0]
+    seconds = float(duration_match[1])
+    if minimum <= seconds <= maximum or not seconds:
         return ""
-    call = next(each for each in moving.calls if each.name.rpartition(".")[2] in LIMITED_MOVES)
-    middle = (least + most) / 2
-    amount = moment.listing.code.number(call.arguments[-1]) if call.arguments else None
+    call = next(each for each in move_statement.calls if each.name.rpartition(".")[2] in LIMITED_MOVES)
+    middle = (minimum + maximum) / 2
+    amount = failure.listing.code.number(call.arguments[-1]) if call.arguments else None
     if call.name.endswith("on_for_seconds") and amount:
         fix = f"Change {amount:g} to about {format_rounded(amount * middle / seconds)}"
     elif call.name.endswith("on_for_seconds"):
@@ -151,121 +158,139 @@ def _hint_about_duration(moment: _Failure) -> str:
         owner, _, name = call.name.rpartition(".")
         write = f"{owner}.on_for_seconds(..., {middle:g})"
         fix = f"{name} turns the wheels by an amount, however long that takes. Write {write}"
-    return f"{moment.listing.locate(moving.line)}: {moment.message_clause}. {fix}"
+    return f"{failure.listing.locate(move_statement.line)}: {failure.message_clause}. {fix}"
 
 
-def _hint_about_unwanted_text(moment: _Failure) -> str:
+def _hint_about_unwanted_text(failure: _Failure) -> str:
     """Return a hint on a text that is not expected: the line that wrote it, and the condition that led there."""
-    unwanted = _UNWANTED.search(moment.found)
-    writing = next((each for each in moment.lines if any(call.name in _WRITING_FUNCTIONS for call in each.calls)), None)
-    if unwanted is None or writing is None:
+    text_match = _UNWANTED.search(failure.found)
+    statement = next(
+        (each for each in failure.lines if any(call.name in _WRITING_FUNCTIONS for call in each.calls)), None
+    )
+    if text_match is None or statement is None:
         return ""
-    text = unwanted[1]
-    head = next((each for each in moment.listing.code.list_enclosing(writing) if each.keyword in _BLOCK_HEADS), None)
+    text = text_match[1]
+    head = next((each for each in failure.listing.code.list_enclosing(statement) if each.keyword in _BLOCK_HEADS), None)
     if head is None:
         fix = "Remove this line, or write another text"
     elif head.keyword == "for":
         fix = f"Check the values of the loop in line {head.line}: {join_tokens(head.tokens[1:]).rstrip(':')}"
     else:
         fix = f"Check the condition in line {head.line}: {join_tokens(head.condition)}. It must be false then"
-    return f"{moment.listing.locate(writing.line)} writes {quote_text(text)}: {moment.message_clause}. {fix}"
+    return f"{failure.listing.locate(statement.line)} writes {quote_text(text)}: {failure.message_clause}. {fix}"
 
 
-def _hint_about_resending(moment: _Failure) -> str:
+def _hint_about_resending(failure: _Failure) -> str:
     """Return a hint on a message that is sent too often or too seldom, with the loop around it."""
-    writing = next((each for each in moment.lines if any(call.name == "print" for call in each.calls)), None)
-    if not isinstance(moment.criterion, Resends) or writing is None:
+    statement = next((each for each in failure.lines if any(call.name == "print" for call in each.calls)), None)
+    if not isinstance(failure.criterion, Resends) or statement is None:
         return ""
-    loop = next((each for each in moment.listing.code.list_enclosing_loops(writing) if each is not writing), None)
-    if "after its answer had come" in moment.found and loop is not None:
+    loop = next((each for each in failure.listing.code.list_enclosing_loops(statement) if each is not statement), None)
+    if "after its answer had come" in failure.found and loop is not None:
         return (
-            f"{moment.listing.locate(writing.line)} sends the message again although its answer had come. Leave "
+            f"{failure.listing.locate(statement.line)} sends the message again although its answer had come. Leave "
             "the loop "
             f"in line {loop.line} as soon as the answer is there, for example with break below if messages:"
         )
-    if "no answer came" not in moment.found:
+    if "no answer came" not in failure.found:
         return ""
     if loop is None:
         return (
-            f"{moment.listing.locate(writing.line)} sends the message once: {moment.message_clause}. Repeat it in a "
+            f"{failure.listing.locate(statement.line)} sends the message once: {failure.message_clause}. Repeat "
+            "it in a "
             "while loop"
         )
-    what = join_tokens(loop.condition) if loop.keyword == "while" else join_tokens(loop.tokens[1:]).rstrip(":")
+    loop_head = join_tokens(loop.condition) if loop.keyword == "while" else join_tokens(loop.tokens[1:]).rstrip(":")
     return (
-        f"{moment.listing.locate(loop.line)}: the loop ended, or went on to the next message, before an answer "
+        f"{failure.listing.locate(loop.line)}: the loop ended, or went on to the next message, before an answer "
         "had come. "
-        f"Check {what}: it must send the message again until the answer is there"
+        f"Check {loop_head}: it must send the message again until the answer is there"
     )
 
 
-def _hint_about_other_sensor(moment: _Failure) -> str:
+def _hint_about_other_sensor(failure: _Failure) -> str:
     """Return a hint on a program that reads only the other light sensor than the one that is judged."""
-    side = getattr(moment.criterion, "sensor", "")
-    named = {each.lower() for each in _ONE_SENSOR.findall(f"{moment.found} {moment.task}")}
-    asked = _SIDES.get(side) or (_SIDES[named.pop()] if len(named) == 1 else "")
-    other = "colorRight" if asked == "colorLeft" else "colorLeft"
-    reading = next((each for each in moment.listing.code.statements if each.has_token(other)), None)
-    if not asked or reading is None or any(each.has_token(asked) for each in moment.listing.code.statements):
+    side = getattr(failure.criterion, "sensor", "")
+    named_sides = {each.lower() for each in _ONE_SENSOR.findall(f"{failure.found} {failure.task}")}
+    required_property = _SIDES.get(side) or (_SIDES[named_sides.pop()] if len(named_sides) == 1 else "")
+    other_property = "colorRight" if required_property == "colorLeft" else "colorLeft"
+    statement = next((each for each in failure.listing.code.statements if each.has_token(other_property)), None)
+    if (
+        not required_property
+        or statement is None
+        or any(each.has_token(required_property) for each in failure.listing.code.statements)
+    ):
         return ""
     return (
-        f"{moment.listing.locate(reading.line)} reads {other}, but {asked} is judged: {moment.message_clause}. Write "
-        f"{asked}"
+        f"{failure.listing.locate(statement.line)} reads {other_property}, but {required_property} is judged: "
+        f"{failure.message_clause}. Write "
+        f"{required_property}"
     )
 
 
-def _hint_about_crossing(moment: _Failure) -> str:
+def _hint_about_crossing(failure: _Failure) -> str:
     """Return a hint on sensors that drive the motors so that the robot turns to the other side than required."""
-    steering = next((each for each in moment.lines if any(_is_steering(call) for call in each.calls)), None)
-    if steering is None or not _OTHER_SIDE.search(moment.found):
+    statement = next((each for each in failure.lines if any(_is_steering(call) for call in each.calls)), None)
+    if statement is None or not _OTHER_SIDE.search(failure.found):
         return ""
-    if not any(each.has_token(*PROPERTIES) for each in moment.listing.code.statements):
+    if not any(each.has_token(*PROPERTIES) for each in failure.listing.code.statements):
         return ""
     return (
-        f"{moment.listing.locate(steering.line)} turns the robot to the other side: {moment.message_clause}. "
+        f"{failure.listing.locate(statement.line)} turns the robot to the other side: {failure.message_clause}. "
         "Exchange the values for the left and the right motor"
     )
 
 
-def _hint_about_loop_end(moment: _Failure) -> str:
+def _hint_about_loop_end(failure: _Failure) -> str:
     """Return a hint on a sensor loop that ended in the wrong place, with the readings there and where it should end."""
-    if not isinstance(moment.criterion, StopOn | EndPose):
+    if not isinstance(failure.criterion, StopOn | EndPose):
         return ""
-    code = moment.listing.code
-    looping = [each for each in moment.lines if _find_sensor_loop(moment.listing, each) is not None]
-    loop = next((_find_sensor_loop(moment.listing, each) for each in looping), None)
+    code = failure.listing.code
+    loop_statements = [each for each in failure.lines if _find_sensor_loop(failure.listing, each) is not None]
+    loop = next((_find_sensor_loop(failure.listing, each) for each in loop_statements), None)
     if loop is None:
         return ""
     condition = join_tokens(loop.condition)
-    seen, required = _describe_readings(moment)
+    last_reading, required_reading = _describe_readings(failure)
     body = code.list_body(loop)
-    if "still running" in moment.found:
-        there = f" In the right place the sensor reads {required}: it must be false there" if required else ""
-        return (
-            f"{moment.listing.locate(loop.line)}: {moment.message_clause}. The loop did not end, because "
-            f"{condition} stayed true."
-            f"{there or ' Choose a condition that becomes false in the right place'}"
+    if "still running" in failure.found:
+        condition_advice = (
+            f" In the right place the sensor reads {required_reading}: it must be false there"
+            if required_reading
+            else ""
         )
-    brake = "" if any(each.keyword == "break" for each in body) else f" as soon as {condition} is false"
-    reads = f" The sensor read {seen}" if seen else ""
-    reads += f", and reads {required} where it should stop." if seen and required else "." if seen else ""
+        return (
+            f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop did not end, because "
+            f"{condition} stayed true."
+            f"{condition_advice or ' Choose a condition that becomes false in the right place'}"
+        )
+    end_clause = "" if any(each.keyword == "break" for each in body) else f" as soon as {condition} is false"
+    reading_sentence = f" The sensor read {last_reading}" if last_reading else ""
+    reading_sentence += (
+        f", and reads {required_reading} where it should stop."
+        if last_reading and required_reading
+        else "."
+        if last_reading
+        else ""
+    )
     return (
-        f"{moment.listing.locate(loop.line)}: {moment.message_clause}. The loop ends{brake}.{reads} "
+        f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop ends{end_clause}.{reading_sentence} "
         "Change the condition, so that it is true until the robot is in the right place"
     )
 
 
 def _find_sensor_loop(listing: Listing, statement: Statement) -> Statement | None:
     """Return the ``while`` loop around a statement that reads a sensor in its condition or body."""
-    for each in (statement, *listing.code.list_enclosing(statement)):
-        body = listing.code.list_body(each) if each.keyword == "while" else ()
-        if each.keyword == "while" and any(one.has_token(*PROPERTIES) for one in (each, *body)):
-            return each
+    for candidate in (statement, *listing.code.list_enclosing(statement)):
+        body = listing.code.list_body(candidate) if candidate.keyword == "while" else ()
+        if candidate.keyword == "while" and any(one.has_token(*PROPERTIES) for one in (candidate, *body)):
+            return candidate
     return None
 
 
-def _describe_readings(moment: _Failure) -> tuple[str, str]:
+def _describe_readings(failure: _Failure) -> tuple[str, str]:
     """Return what the light sensor read at the end and what it reads in the required place, where known."""
-    criterion, recording = moment.criterion, moment.recording
+    criterion, recording = failure.criterion, failure.recording
     if not isinstance(criterion, StopOn) or not len(recording.ticks):
         return "", ""
     colours = recording.ticks.right_rgb if criterion.sensor == "right" else recording.ticks.left_rgb
@@ -277,17 +302,17 @@ def _describe_required_reading(criterion: StopOn, recording: Recording) -> str:
     if criterion.rgb is not None:
         return _format_colour(criterion.rgb)
     if criterion.reflected is not None:
-        least, most = criterion.reflected
-        return f"{least:g} to {most:g} %"
-    place = criterion.near
+        minimum, maximum = criterion.reflected
+        return f"{minimum:g} to {maximum:g} %"
+    position = criterion.near
     if criterion.zone is not None:
         left, bottom, right, top = criterion.zone
-        place = (left + right) / 2, min(max(recording.end.y, bottom), top)
+        position = (left + right) / 2, min(max(recording.end.y, bottom), top)
     floor = rebuild_floor(recording)
-    if place is None or floor is None:
+    if position is None or floor is None:
         return ""
     height, width = floor.pixels.shape[:2]
-    column, row = round(place[0]), height - 1 - round(place[1])
+    column, row = round(position[0]), height - 1 - round(position[1])
     # A place may lie beside the floor, and a robot may end there.
     if not (0 <= column < width and 0 <= row < height):
         return ""
@@ -300,15 +325,15 @@ def _format_colour(rgb: Sequence[float]) -> str:
     return f"{100 * red / 255:.1f} %, rgb ({red}, {green}, {blue})"
 
 
-def _hint_about_steering(moment: _Failure) -> str:
+def _hint_about_steering(failure: _Failure) -> str:
     """Return a hint on a robot that lost the line: the line that steers, and its speed and gain."""
-    if not isinstance(moment.criterion, Follows | Laps):
+    if not isinstance(failure.criterion, Follows | Laps):
         return ""
-    steering = next(((each, call) for each in moment.lines for call in each.calls if _is_steering(call)), None)
-    if steering is None:
+    steering_pair = next(((each, call) for each in failure.lines for call in each.calls if _is_steering(call)), None)
+    if steering_pair is None:
         return ""
     return (
-        f"{moment.listing.locate(steering[0].line)} steers: {moment.message_clause}. If the robot turns too "
+        f"{failure.listing.locate(steering_pair[0].line)} steers: {failure.message_clause}. If the robot turns too "
         "little, multiply the "
         "difference by a larger number or drive slower; if it turns away from the line, change the sign of the steering"
     )

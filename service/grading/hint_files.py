@@ -28,23 +28,29 @@ _CUT_VALUE = re.compile(r"'(\w+)' is not a flag\n.*?(-[br]|--background|--robotS
 
 def hint_about_starter_files(clues: Clues) -> Iterator[str]:
     """Yield a hint if the parts are unchanged starter files."""
-    own = {each.name: each for each in clues.listings if each.part is not None}
-    given = {name: text for name, text in _load_starter_files(clues.assignment).items() if name in own}
+    parts_by_name = {each.name: each for each in clues.listings if each.part is not None}
+    starter_files = {
+        name: text for name, text in _load_starter_files(clues.assignment).items() if name in parts_by_name
+    }
     if (
         not clues.lost
-        or not given
-        or any(_drop_blank_lines(own[name].lines) != _drop_blank_lines(given[name]) for name in given)
+        or not starter_files
+        or any(
+            _drop_blank_lines(parts_by_name[name].lines) != _drop_blank_lines(starter_files[name])
+            for name in starter_files
+        )
     ):
         return
     name, text = next(
-        ((name, text) for name, text in given.items() if _find_todo_line(text)), next(iter(given.items()))
+        ((name, text) for name, text in starter_files.items() if _find_todo_line(text)),
+        next(iter(starter_files.items())),
     )
     line = _find_todo_line(text)
-    as_given = f"{name} is the starter as it was given, and has nothing of your own yet"
+    sentence = f"{name} is the starter as it was given, and has nothing of your own yet"
     if line:
-        yield f"line {line} of {name}: {as_given}. Begin here: {text[line - 1].strip(' #')}"
+        yield f"line {line} of {name}: {sentence}. Begin here: {text[line - 1].strip(' #')}"
     else:
-        yield f"{as_given}. Add your own lines to it"
+        yield f"{sentence}. Add your own lines to it"
 
 
 def _find_todo_line(lines: Sequence[str]) -> int:
@@ -80,23 +86,25 @@ def hint_about_swapped_parts(clues: Clues) -> Iterator[str]:
 
 def hint_about_ignored_magic(clues: Clues) -> Iterator[str]:
     """Yield a hint on an ignored magic line, if its flags are required or -p was needed to draw."""
-    draws = any(isinstance(each, Drawing | Circuits) for each in clues.lost)
-    asks = any(isinstance(each, SourceRules) and each.flags for each in clues.lost)
-    if not clues.ignored_magic or not (draws or asks):
+    needs_pen = any(isinstance(each, Drawing | Circuits) for each in clues.lost)
+    needs_flags = any(isinstance(each, SourceRules) and each.flags for each in clues.lost)
+    if not clues.ignored_magic or not (needs_pen or needs_flags):
         return
     for listing in clues.programs:
-        place = listing.magic_place
-        if place is not None and (clues.marked_cell is None or listing.name == f"cell {clues.marked_cell}"):
-            why = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
-            cut = _CUT_VALUE.search(f"{why}\n{listing.lines[place]}")
-            if cut is not None:
-                fix = f"The value of {cut[2]} has no blank: write {cut[2]} {cut[3]}_{cut[1]}"
-            elif draws:
+        magic_index = listing.magic_place
+        if magic_index is not None and (clues.marked_cell is None or listing.name == f"cell {clues.marked_cell}"):
+            reason = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
+            cut_match = _CUT_VALUE.search(f"{reason}\n{listing.lines[magic_index]}")
+            if cut_match is not None:
+                fix = f"The value of {cut_match[2]} has no blank: write {cut_match[2]} {cut_match[3]}_{cut_match[1]}"
+            elif needs_pen:
                 fix = "Write -p to put the pen down, and check the other flags"
             else:
                 fix = "Correct it, and check the other flags"
-            pen = ", and the pen was never down" if draws else ""
-            yield f"{listing.locate(place + 1)}: {why}, so all flags of the line are ignored{pen}. {fix}"
+            pen_clause = ", and the pen was never down" if needs_pen else ""
+            yield (
+                f"{listing.locate(magic_index + 1)}: {reason}, so all flags of the line are ignored{pen_clause}. {fix}"
+            )
             return
 
 
@@ -123,35 +131,42 @@ def hint_about_several_programs(clues: Clues) -> Iterator[str]:
     """Yield a hint if a notebook has other robot cells that drive but are not graded."""
     if clues.marked_cell is None or not any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost):
         return
-    marked = f"cell {clues.marked_cell}"
-    others = [
-        each for each in clues.programs if each.name != marked and any(_is_driving(one) for one in each.code.statements)
+    marked_cell = f"cell {clues.marked_cell}"
+    other_programs = [
+        each
+        for each in clues.programs
+        if each.name != marked_cell and any(_is_driving(one) for one in each.code.statements)
     ]
-    if others:
+    if other_programs:
         yield (
-            f"only the robot program in {marked} is marked; {others[-1].name} is a program by itself. "
-            f"If they belong together, put both into {marked}"
+            f"only the robot program in {marked_cell} is marked; {other_programs[-1].name} is a program by itself. "
+            f"If they belong together, put both into {marked_cell}"
         )
 
 
 def _hint_about_redefinitions(process: list[Listing]) -> Iterator[str]:
-    first: dict[str, tuple[Listing, Statement]] = {}
+    definitions: dict[str, tuple[Listing, Statement]] = {}
     for listing in process:
-        for each in listing.code.statements:
-            if each.keyword == "def" and not each.indent and len(each.tokens) > 1:
-                name = each.tokens[1]
-                if name in first:
-                    before, head = first[name]
-                    where = f"line {head.line}" if before is listing else f"line {head.line} of {before.name}"
+        for statement in listing.code.statements:
+            if statement.keyword == "def" and not statement.indent and len(statement.tokens) > 1:
+                name = statement.tokens[1]
+                if name in definitions:
+                    earlier_listing, head = definitions[name]
+                    location = (
+                        f"line {head.line}"
+                        if earlier_listing is listing
+                        else f"line {head.line} of {earlier_listing.name}"
+                    )
                     yield (
-                        f"{listing.locate(each.line)} defines {name} again, in place of the function in {where}. "
+                        f"{listing.locate(statement.line)} defines {name} again, in place of the function in "
+                        f"{location}. "
                         "Delete one of the two, or give it another name"
                     )
                     return
-                first[name] = listing, each
-            elif not each.indent:
-                for called in {call.name for call in each.calls} & first.keys():
-                    del first[called]
+                definitions[name] = listing, statement
+            elif not statement.indent:
+                for called_name in {call.name for call in statement.calls} & definitions.keys():
+                    del definitions[called_name]
 
 
 def _is_driving(statement: Statement) -> bool:

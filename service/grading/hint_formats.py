@@ -34,9 +34,12 @@ _MIN_SIMILARITY = 0.75
 
 def hint_about_missing_files(clues: Clues) -> Iterator[str]:
     """Yield a hint on a part that was submitted under a similar file name."""
-    near = find_similar_file(clues.missing, clues.files) if clues.missing is not None else ""
-    if clues.missing is not None and near:
-        yield f"there is {sanitise_name(near)}, but no {PART_FILES[clues.missing]}; expected that name, so rename it"
+    similar_name = find_similar_file(clues.missing, clues.files) if clues.missing is not None else ""
+    if clues.missing is not None and similar_name:
+        yield (
+            f"there is {sanitise_name(similar_name)}, but no {PART_FILES[clues.missing]}; expected that name, so "
+            "rename it"
+        )
 
 
 def hint_about_empty_parts(clues: Clues) -> Iterator[str]:
@@ -53,16 +56,16 @@ def hint_about_empty_parts(clues: Clues) -> Iterator[str]:
 
 def hint_about_magics(clues: Clues) -> Iterator[str]:
     """Yield a hint on a magic line that is below other code, lacks its %, or is valid only in a notebook."""
-    faulty = [fault for fault in clues.faults if fault.message.startswith(("SyntaxError", "NameError"))]
+    syntax_faults = [fault for fault in clues.faults if fault.message.startswith(("SyntaxError", "NameError"))]
     for listing in clues.listings:
         if listing.part is None:
             continue
-        lines = [fault.line for fault in faulty if name_faulty_text(fault) == listing.name]
+        lines = [fault.line for fault in syntax_faults if name_faulty_text(fault) == listing.name]
         if not lines:
             continue
-        place = listing.magic_place
+        magic_index = listing.magic_place
         for number, line in enumerate(listing.lines, 1):
-            if place == number - 1 and listing.part == "program":
+            if magic_index == number - 1 and listing.part == "program":
                 continue
             if NEARLY_MAGIC.match(line):
                 yield _hint_about_magic(listing, number, line)
@@ -73,14 +76,17 @@ def hint_about_magics(clues: Clues) -> Iterator[str]:
 
 
 def _hint_about_magic(listing: Listing, number: int, line: str) -> str:
-    what = f"{listing.locate(number)} is {quote_text(line)}"
+    description = f"{listing.locate(number)} is {quote_text(line)}"
     if listing.part == "responder":
-        return f"{what}, which begins a robot program; expected it in robot.py alone"
-    above = next((n for n, text in enumerate(listing.lines[: number - 1], 1) if not _is_empty_line(text)), None)
-    if above is not None:
-        code = quote_text(listing.lines[above - 1])
-        return f"{what}, but line {above}, {code}, stands above it; expected only blank lines and comments there"
-    return f"{what}; expected %%sim_magic_preloaded and its flags"
+        return f"{description}, which begins a robot program; expected it in robot.py alone"
+    code_line = next((n for n, text in enumerate(listing.lines[: number - 1], 1) if not _is_empty_line(text)), None)
+    if code_line is not None:
+        code = quote_text(listing.lines[code_line - 1])
+        return (
+            f"{description}, but line {code_line}, {code}, stands above it; expected only blank lines and comments "
+            "there"
+        )
+    return f"{description}; expected %%sim_magic_preloaded and its flags"
 
 
 def hint_about_messages(clues: Clues) -> Iterator[str]:
@@ -88,19 +94,19 @@ def hint_about_messages(clues: Clues) -> Iterator[str]:
     if not clues.collaborative or not any(clues.list_texts("program")):
         return
     for text in clues.printed:
-        late = _LATE_PY.match(text)
-        if late and not clues.sent and not text.startswith(PY):
-            where = clues.describe_matching_line("program", re.compile(r"""["'](?:PY::|IMG_DATA)"""))
+        late_match = _LATE_PY.match(text)
+        if late_match and not clues.sent and not text.startswith(PY):
+            location = clues.describe_matching_line("program", re.compile(r"""["'](?:PY::|IMG_DATA)"""))
             yield (
-                f"{where} prints {quote_text(text)}, which is not sent as a message; expected "
-                f"{quote_text(late[1])} at the "
+                f"{location} prints {quote_text(text)}, which is not sent as a message; expected "
+                f"{quote_text(late_match[1])} at the "
                 "start of the text. Print the other words with a print of their own"
             )
             return
-        begin = _NEARLY_PY.match(text)
-        if begin and not text.startswith(PY):
+        prefix_match = _NEARLY_PY.match(text)
+        if prefix_match and not text.startswith(PY):
             yield (
-                f"{clues.describe_matching_line('program', _build_literal_pattern(begin[0]))} prints "
+                f"{clues.describe_matching_line('program', _build_literal_pattern(prefix_match[0]))} prints "
                 f'"{text[:60]}", which is not sent as a message; '
                 f'expected "{PY}" at its very start, in capitals, with two colons and no blank'
             )
@@ -114,25 +120,30 @@ def hint_about_images(clues: Clues) -> Iterator[str]:
     for text in (*clues.printed, *clues.sent):
         if classify_text(text) == "image":
             continue
-        said = text[:40].partition(":{")[0]
-        word = said.removeprefix(PY).strip(" :'\"")
-        near = max(_measure_similarity(word.upper(), IMG_DATA), _measure_similarity(word.upper(), "IMAGE_DATA"))
-        if text != _NO_SIDE and near < _MIN_SIMILARITY:
-            continue
-        printed = "image_data" if text == _NO_SIDE else text
-        where = clues.describe_matching_line(
-            "program", _build_literal_pattern("image_data" if text == _NO_SIDE else said)
+        printed_prefix = text[:40].partition(":{")[0]
+        keyword = printed_prefix.removeprefix(PY).strip(" :'\"")
+        similarity = max(
+            _measure_similarity(keyword.upper(), IMG_DATA), _measure_similarity(keyword.upper(), "IMAGE_DATA")
         )
-        yield f'{where} prints {quote_text(printed)}, which sends no image; expected "{IMG_DATA}" and nothing before it'
+        if text != _NO_SIDE and similarity < _MIN_SIMILARITY:
+            continue
+        printed_text = "image_data" if text == _NO_SIDE else text
+        location = clues.describe_matching_line(
+            "program", _build_literal_pattern("image_data" if text == _NO_SIDE else printed_prefix)
+        )
+        yield (
+            f'{location} prints {quote_text(printed_text)}, which sends no image; expected "{IMG_DATA}" and nothing '
+            "before it"
+        )
         return
 
 
 def hint_about_image_log(clues: Clues) -> Iterator[str]:
     """Yield a hint on a print that logs no image because it names no side."""
     if not clues.collaborative and clues.lost and _NO_SIDE in clues.printed:
-        where = clues.describe_matching_line("program", _build_literal_pattern("image_data"))
+        location = clues.describe_matching_line("program", _build_literal_pattern("image_data"))
         yield (
-            f'{where} prints "image_data" without a side, so no image is logged. Write "image_data both", '
+            f'{location} prints "image_data" without a side, so no image is logged. Write "image_data both", '
             '"image_data left" or "image_data right"'
         )
 
@@ -140,14 +151,17 @@ def hint_about_image_log(clues: Clues) -> Iterator[str]:
 def hint_about_quoted_names(clues: Clues) -> Iterator[str]:
     """Yield a hint on a message that contains a variable's name instead of its value."""
     for text in (*clues.sent, *clues.printed) if clues.lost else ():
-        name = _NAME_IN_TEXT.match(text)
-        if name is None:
+        match = _NAME_IN_TEXT.match(text)
+        if match is None:
             continue
-        word = name[1].strip("{}")
-        if any(word in each.bound_names for listing in clues.programs for each in listing.code.statements):
-            where = clues.describe_matching_line("program", re.compile(re.escape(f"{PY}{name[1]}")))
-            better = f'f"{PY}{{{word}}}"'
-            yield f'{where} sends {quote_text(text)}: the name, and not its value such as "{PY}0"; expected {better}'
+        variable = match[1].strip("{}")
+        if any(variable in each.bound_names for listing in clues.programs for each in listing.code.statements):
+            location = clues.describe_matching_line("program", re.compile(re.escape(f"{PY}{match[1]}")))
+            fixed_text = f'f"{PY}{{{variable}}}"'
+            yield (
+                f'{location} sends {quote_text(text)}: the name, and not its value such as "{PY}0"; expected '
+                f"{fixed_text}"
+            )
             return
 
 
@@ -158,15 +172,17 @@ def hint_about_answers(clues: Clues) -> Iterator[str]:
     for text in clues.answers:
         if text.startswith(JSON):
             continue
-        begin = _NEARLY_JSON.match(text)
-        if begin:
-            where = clues.describe_matching_line("responder", _build_literal_pattern(begin[0].rstrip(" [{\"'")))
+        prefix_match = _NEARLY_JSON.match(text)
+        if prefix_match:
+            location = clues.describe_matching_line(
+                "responder", _build_literal_pattern(prefix_match[0].rstrip(" [{\"'"))
+            )
         elif text.lstrip().startswith("{") and clues.should_use_queue:
-            where = describe_return_line(text, clues)
+            location = describe_return_line(text, clues)
         else:
             continue
-        missing = f'which is not added to the message queue; expected "{JSON}" at its very start'
-        yield f"{where}: the answer is {quote_text(text)}, {missing}"
+        explanation = f'which is not added to the message queue; expected "{JSON}" at its very start'
+        yield f"{location}: the answer is {quote_text(text)}, {explanation}"
         return
 
 
@@ -183,10 +199,10 @@ def _is_empty_line(line: str) -> bool:
     return not line.strip() or line.lstrip().startswith("#")
 
 
-def _build_literal_pattern(begin: str) -> re.Pattern[str]:
+def _build_literal_pattern(opening: str) -> re.Pattern[str]:
     """Return a pattern for a quoted text with this beginning."""
-    return re.compile(rf"""["']\s*{re.escape(begin.strip())}(?!:)""")
+    return re.compile(rf"""["']\s*{re.escape(opening.strip())}(?!:)""")
 
 
-def _measure_similarity(one: str, other: str) -> float:
-    return difflib.SequenceMatcher(None, one, other).ratio()
+def _measure_similarity(first: str, second: str) -> float:
+    return difflib.SequenceMatcher(None, first, second).ratio()

@@ -35,18 +35,18 @@ def hint_about_gain(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``GAIN * light - EDGE``, where brackets around the difference are missing."""
     if not any(isinstance(each, Follows | Laps) for each in clues.lost):
         return
-    for listing, each in collect_statements(clues):
-        tokens = each.tokens
-        for place in range(2, len(tokens) - 2):
-            gain, times, light, minus, edge = tokens[place - 2 : place + 3]
+    for listing, statement in collect_statements(clues):
+        tokens = statement.tokens
+        for index in range(2, len(tokens) - 2):
+            gain, times, light, minus, edge = tokens[index - 2 : index + 3]
             if (times, minus) != ("*", "-") or not find_reading((light,), listing.code):
                 continue
             factor, offset = listing.code.number((gain,)), listing.code.number((edge,))
-            least, most, _ = READINGS[find_reading((light,), listing.code)]
-            if factor and offset is not None and not least < offset / factor < most:
-                sign = "below" if factor * most <= offset else "above"
+            minimum, maximum, _ = READINGS[find_reading((light,), listing.code)]
+            if factor and offset is not None and not minimum < offset / factor < maximum:
+                sign = "below" if factor * maximum <= offset else "above"
                 yield (
-                    f"{listing.locate(each.line)}: {join_tokens(tokens[place - 2 : place + 3])} multiplies first, "
+                    f"{listing.locate(statement.line)}: {join_tokens(tokens[index - 2 : index + 3])} multiplies first, "
                     "so it is "
                     f"{sign} 0 for each reading. Write {gain} * ({light} - {edge})"
                 )
@@ -58,15 +58,20 @@ def hint_about_division(clues: Clues) -> Iterator[str]:
     if not any(isinstance(each, Functions | Reports) for each in clues.lost):
         return
     for listing in (*clues.programs, *clues.responders):
-        for each in listing.code.statements:
-            tokens = each.tokens
-            for place, token in enumerate(tokens[:-3]):
-                name, times = tokens[place + 1 : place + 3]
-                pi = tokens[place + 3 : place + 6] == ("math", ".", "pi")
-                if token == "/" and _DIAMETER_NAME.search(name) and times == "*" and (pi or tokens[place + 3] == "pi"):
-                    circumference = f"{name} * {'math.pi' if pi else 'pi'}"
+        for statement in listing.code.statements:
+            tokens = statement.tokens
+            for index, token in enumerate(tokens[:-3]):
+                name, times = tokens[index + 1 : index + 3]
+                is_math_pi = tokens[index + 3 : index + 6] == ("math", ".", "pi")
+                if (
+                    token == "/"
+                    and _DIAMETER_NAME.search(name)
+                    and times == "*"
+                    and (is_math_pi or tokens[index + 3] == "pi")
+                ):
+                    circumference = f"{name} * {'math.pi' if is_math_pi else 'pi'}"
                     yield (
-                        f"{listing.locate(each.line)} divides by {name} only, and then multiplies by pi. "
+                        f"{listing.locate(statement.line)} divides by {name} only, and then multiplies by pi. "
                         f"Put brackets around the product: / ({circumference})"
                     )
                     return
@@ -78,18 +83,19 @@ def hint_about_radius(clues: Clues) -> Iterator[str]:
         each for each in clues.results if any(each.id == one.id for one in clues.lost if isinstance(one, Reports))
     ]
     for result in results:
-        asked = _ASKED_NUMBER.search(result.message)
-        said = _NUMBER.findall(result.message.rpartition(": ")[2])
-        if asked is None or len(said) != 1 or not float(asked[1]):
+        required_match = _ASKED_NUMBER.search(result.message)
+        reported_numbers = _NUMBER.findall(result.message.rpartition(": ")[2])
+        if required_match is None or len(reported_numbers) != 1 or not float(required_match[1]):
             continue
-        is_half = abs(float(said[0]) / float(asked[1]) - 0.5) < _HALF_TOLERANCE
-        for listing, each in collect_statements(clues) if is_half else ():
-            place = next((at for at, token in enumerate(each.tokens[:-2]) if token == "pi"), None)
-            if place is not None and each.tokens[place + 1] == "*":
+        is_half = abs(float(reported_numbers[0]) / float(required_match[1]) - 0.5) < _HALF_TOLERANCE
+        for listing, statement in collect_statements(clues) if is_half else ():
+            pi_index = next((at for at, token in enumerate(statement.tokens[:-2]) if token == "pi"), None)
+            if pi_index is not None and statement.tokens[pi_index + 1] == "*":
                 yield (
-                    f"{listing.locate(each.line)}: the result {said[0]} is half of {asked[1]}. A wheel's "
+                    f"{listing.locate(statement.line)}: the result {reported_numbers[0]} is half of "
+                    f"{required_match[1]}. A wheel's "
                     "circumference is "
-                    f"pi times the diameter. If {each.tokens[place + 2]} is the radius, multiply it by 2"
+                    f"pi times the diameter. If {statement.tokens[pi_index + 2]} is the radius, multiply it by 2"
                 )
                 return
 
@@ -98,15 +104,16 @@ def hint_about_reversed_distance(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``18 - distance`` in a wrong order, if the robot drove backwards."""
     if not any(isinstance(each, Apart) for each in clues.lost) or not any(map(_has_driven_backwards, clues.recordings)):
         return
-    for listing, each in collect_statements(clues):
-        for place, token in enumerate(each.tokens[:-1]):
-            if token != "-" or listing.code.number(each.tokens[place - 1 : place]) is None:
+    for listing, statement in collect_statements(clues):
+        for index, token in enumerate(statement.tokens[:-1]):
+            if token != "-" or listing.code.number(statement.tokens[index - 1 : index]) is None:
                 continue
-            reading = _find_distance_reading(listing, each.tokens[place + 1 :])
+            reading = _find_distance_reading(listing, statement.tokens[index + 1 :])
             if reading:
-                number = each.tokens[place - 1]
+                number = statement.tokens[index - 1]
                 yield (
-                    f"{listing.locate(each.line)}: {number} - {reading} is below 0 when the distance is larger, so the "
+                    f"{listing.locate(statement.line)}: {number} - {reading} is below 0 when the distance is "
+                    "larger, so the "
                     f"robot drives backwards. Write {reading} - {number}"
                 )
                 return
@@ -122,27 +129,31 @@ def hint_about_gyro_direction(clues: Clues) -> Iterator[str]:
                 continue
             for loop in listing.code.list_enclosing_loops(statement):
                 sign = next((token for token in loop.condition if token in ("<", ">", "<=", ">=")), "")
-                left = loop.condition[: loop.condition.index(sign)] if sign else ()
-                turned = _measure_final_turn(recording)
-                if "angle" not in left or "-" in left[: left.index("angle")] or abs(turned) < 1:
+                left_operand = loop.condition[: loop.condition.index(sign)] if sign else ()
+                turn_angle = _measure_final_turn(recording)
+                if (
+                    "angle" not in left_operand
+                    or "-" in left_operand[: left_operand.index("angle")]
+                    or abs(turn_angle) < 1
+                ):
                     continue
-                if (turned < 0) == sign.startswith("<"):
-                    way, side = ("falls", "left") if turned < 0 else ("grows", "right")
+                if (turn_angle < 0) == sign.startswith("<"):
+                    verb, side = ("falls", "left") if turn_angle < 0 else ("grows", "right")
                     yield (
-                        f"{listing.locate(loop.line)}: the gyro {way} when the robot turns {side}, so the loop "
+                        f"{listing.locate(loop.line)}: the gyro {verb} when the robot turns {side}, so the loop "
                         "never ends: "
-                        f"{join_tokens(loop.condition)} stays true. Write {_swap_operands(left)} in place of "
-                        f"{join_tokens(left)}"
+                        f"{join_tokens(loop.condition)} stays true. Write {_swap_operands(left_operand)} in place of "
+                        f"{join_tokens(left_operand)}"
                     )
                     return
 
 
-def _swap_operands(left: Sequence[str]) -> str:
+def _swap_operands(operand: Sequence[str]) -> str:
     """Return the difference with its operands swapped; the negated value if there is no difference."""
-    if "-" in left:
-        place = list(left).index("-")
-        return join_tokens((*left[place + 1 :], "-", *left[:place]))
-    return f"-{join_tokens(left)}"
+    if "-" in operand:
+        minus_index = list(operand).index("-")
+        return join_tokens((*operand[minus_index + 1 :], "-", *operand[:minus_index]))
+    return f"-{join_tokens(operand)}"
 
 
 def _find_distance_reading(listing: Listing, tokens: Sequence[str]) -> str:

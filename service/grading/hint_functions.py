@@ -36,19 +36,20 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value, and how the value differs from the expected one."""
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.costliest_criteria:
-        told = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
-        called, values = _CALLED.search(told), _VALUES.search(told)
-        if called is None or values is None:
+        message = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
+        call_match, value_match = _CALLED.search(message), _VALUES.search(message)
+        if call_match is None or value_match is None:
             continue
-        advice = advise_on_difference(parse_value(values[1]), parse_value(values[2]))
-        if not advice and values[2].startswith("[["):
+        advice = advise_on_difference(parse_value(value_match[1]), parse_value(value_match[2]))
+        if not advice and value_match[2].startswith("[["):
             advice = advise_on_difference([], [[]])
-        making = _find_value_statement(called[1], clues)
-        if making is not None:
-            listing, each = making
+        value_statement = _find_value_statement(call_match[1], clues)
+        if value_statement is not None:
+            listing, statement = value_statement
             fix = advice or "Work this call out by hand, line by line, and compare"
             yield (
-                f"{listing.locate(each.line)}, {join_tokens(each.tokens)}: {told[0].lower()}{told[1:].rstrip('.')}. "
+                f"{listing.locate(statement.line)}, {join_tokens(statement.tokens)}: "
+                f"{message[0].lower()}{message[1:].rstrip('.')}. "
                 f"{fix}"
             )
             return
@@ -57,14 +58,15 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
 def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
     """Yield a hint on an ``except`` that catches too few errors, if only hidden calls failed."""
     for criterion in clues.costliest_criteria:
-        told = next((each.message for each in clues.results if each.id == criterion.id), "")
-        if not isinstance(criterion, Functions) or _HIDDEN_CALLS not in told:
+        message = next((each.message for each in clues.results if each.id == criterion.id), "")
+        if not isinstance(criterion, Functions) or _HIDDEN_CALLS not in message:
             continue
         for listing in clues.responders:
-            for each in listing.code.statements:
-                if each.keyword == "except" and len(each.tokens) > 2 and not each.has_token("Exception"):
+            for statement in listing.code.statements:
+                if statement.keyword == "except" and len(statement.tokens) > 2 and not statement.has_token("Exception"):
                     yield (
-                        f"{listing.locate(each.line)} catches only {join_tokens(each.tokens[1:]).rstrip(':')}. "
+                        f"{listing.locate(statement.line)} catches only "
+                        f"{join_tokens(statement.tokens[1:]).rstrip(':')}. "
                         "Another error, "
                         "such as KeyError or TypeError, ends the function. Write except Exception:"
                     )
@@ -79,10 +81,10 @@ def _find_value_statement(name: str, clues: Clues) -> tuple[Listing, Statement] 
             appends = [each for each in body if any(call.name.endswith(".append") for call in each.calls)]
             returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
             # A returned name says nothing about the line that went wrong.
-            computed = [each for each in returns if len(each.tokens) > 2]
-            for found in (appends, computed):
-                if len(found) == 1:
-                    return listing, found[0]
+            computed_returns = [each for each in returns if len(each.tokens) > 2]
+            for candidates in (appends, computed_returns):
+                if len(candidates) == 1:
+                    return listing, candidates[0]
     return None
 
 
@@ -92,21 +94,21 @@ def hint_about_functions(clues: Clues) -> Iterator[str]:
     for criterion in clues.lost:
         if not isinstance(criterion, Functions):
             continue
-        told = messages.get(criterion.id, "")
+        message = messages.get(criterion.id, "")
         names = {criterion.function, *(call.function for call in criterion.calls)} - {""}
         for name in sorted(names):
-            found = _hint_about_function_error(told, clues) or _hint_about_function(name, told, clues)
-            if found:
-                yield found
+            hint = _hint_about_function_error(message, clues) or _hint_about_function(name, message, clues)
+            if hint:
+                yield hint
                 break
 
 
-def hint_about_wrong_values(name: str, told: str) -> str:
+def hint_about_wrong_values(name: str, message: str) -> str:
     """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
-    expected = f"{told[0].lower()}{told[1:].rstrip('.')}"
-    if _HIDDEN_CALLS not in told:
-        called = _CALLED.search(told)
-        return f"The function {called[1] if called else name}: {expected}"
+    expected = f"{message[0].lower()}{message[1:].rstrip('.')}"
+    if _HIDDEN_CALLS not in message:
+        match = _CALLED.search(message)
+        return f"The function {match[1] if match else name}: {expected}"
     return (
         f"The function {name}: {expected}. Call it yourself with other arguments: 0, the largest and the smallest, "
         "equal ones, numbers with a fraction, and those on the borders of each rule"
@@ -125,8 +127,8 @@ def hint_about_missing_return(clues: Clues) -> Iterator[str]:
     name = next((found[1] for fault in clues.faults if (found := _GAVE_NOTHING.search(fault.message))), "")
     for listing in clues.responders:
         for head in listing.code.list_functions():
-            returns = any(each.keyword == "return" for each in listing.code.list_body(head))
-            if head.tokens[1] == name and not returns:
+            has_return = any(each.keyword == "return" for each in listing.code.list_body(head))
+            if head.tokens[1] == name and not has_return:
                 yield describe_missing_return(listing, head)
                 return
 
@@ -136,70 +138,76 @@ def find_early_return(listing: Listing, head: Statement) -> Statement | None:
 
     It is directly in the loop, or in the else of an if whose branches all return.
     """
-    for each in listing.code.list_body(head):
-        parent = listing.code.statements[each.parent] if each.parent >= 0 else None
-        if each.keyword != "return" or parent is None:
+    for statement in listing.code.list_body(head):
+        parent = listing.code.statements[statement.parent] if statement.parent >= 0 else None
+        if statement.keyword != "return" or parent is None:
             continue
         if parent.keyword in LOOPS or (parent.keyword == "else" and _has_exhaustive_returns(listing, parent)):
-            return each
+            return statement
     return None
 
 
-def _has_exhaustive_returns(listing: Listing, last: Statement) -> bool:
+def _has_exhaustive_returns(listing: Listing, else_branch: Statement) -> bool:
     """Return whether an ``else`` is directly in a loop and all branches before it also end with a return."""
-    loop = listing.code.statements[last.parent] if last.parent >= 0 else None
+    loop = listing.code.statements[else_branch.parent] if else_branch.parent >= 0 else None
     if loop is None or loop.keyword not in LOOPS:
         return False
-    beside = [each for each in listing.code.list_body(loop) if each.parent == loop.number and each.number < last.number]
-    for each in reversed(beside):
-        ending = [one for one in listing.code.list_body(each) if one.parent == each.number][-1:]
-        if each.keyword not in ("if", "elif") or not ending or ending[0].keyword != "return":
+    siblings = [
+        each for each in listing.code.list_body(loop) if each.parent == loop.number and each.number < else_branch.number
+    ]
+    for branch in reversed(siblings):
+        last_statement = [one for one in listing.code.list_body(branch) if one.parent == branch.number][-1:]
+        if branch.keyword not in ("if", "elif") or not last_statement or last_statement[0].keyword != "return":
             return False
-        if each.keyword == "if":
+        if branch.keyword == "if":
             return True
     return False
 
 
-def _hint_about_function_error(told: str, clues: Clues) -> str:
+def _hint_about_function_error(message: str, clues: Clues) -> str:
     """Return the line where a called function failed, with advice on its error; empty if unknown."""
-    found = _FAILED.search(told)
+    match = _FAILED.search(message)
     listing = next((each for each in clues.responders if each.part == "responder"), None)
-    if found is None or listing is None:
+    if match is None or listing is None:
         return ""
-    line, error = int(found[2]), found[1]
+    line, error = int(match[2]), match[1]
     fault = Fault(0.0, Verdict.RESPONDER_ERROR, "responder", error, line)
     return f"{listing.locate(line)}: {describe_error(fault, clues)}"
 
 
-def _hint_about_function(name: str, told: str, clues: Clues) -> str:
-    defined = [
+def _hint_about_function(name: str, message: str, clues: Clues) -> str:
+    functions = [
         (listing, head) for listing in clues.responders for head in listing.code.list_functions() if not head.indent
     ]
-    own = next(((listing, head) for listing, head in defined if head.tokens[1] == name), None)
-    if own is None:
-        if _NO_FUNCTION not in told:
+    function = next(((listing, head) for listing, head in functions if head.tokens[1] == name), None)
+    if function is None:
+        if _NO_FUNCTION not in message:
             return ""
-        near = difflib.get_close_matches(name, [head.tokens[1] for _, head in defined], 1, _MIN_SIMILARITY)
-        listing, head = next(((one, each) for one, each in defined if each.tokens[1] in near), (None, None))
+        similar_names = difflib.get_close_matches(name, [head.tokens[1] for _, head in functions], 1, _MIN_SIMILARITY)
+        listing, head = next(((one, each) for one, each in functions if each.tokens[1] in similar_names), (None, None))
         if listing is None or head is None:
             return ""
         return f"{listing.locate(head.line)} defines {sanitise_name(head.tokens[1])}; expected a function called {name}"
-    listing, head = own
+    listing, head = function
     body = listing.code.list_body(head)
     returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
-    prints = next((each for each in body if each.keyword == "print"), None)
-    if not returns and prints is not None:
-        return f"{listing.locate(prints.line)} prints the result of {name} and does not return it. Write return there"
-    if not returns and _RETURNED_NOTHING.search(told):
-        return describe_missing_return(listing, head)
-    early = find_early_return(listing, head)
-    if early is not None:
+    print_statement = next((each for each in body if each.keyword == "print"), None)
+    if not returns and print_statement is not None:
         return (
-            f"{listing.locate(early.line)}: return is in the loop, so {name} ends in the first pass of the loop. Move "
+            f"{listing.locate(print_statement.line)} prints the result of {name} and does not return it. Write return "
+            "there"
+        )
+    if not returns and _RETURNED_NOTHING.search(message):
+        return describe_missing_return(listing, head)
+    early_return = find_early_return(listing, head)
+    if early_return is not None:
+        return (
+            f"{listing.locate(early_return.line)}: return is in the loop, so {name} ends in the first pass of the "
+            "loop. Move "
             "return below the loop: indent it less"
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
-    lists = _LISTS.search(told)
+    lists = _LISTS.search(message)
     if stop is not None and lists and len(lists[2].split(",")) < len(lists[1].split(",")) + (lists[2] == "[]"):
         return (
             f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip "

@@ -31,20 +31,21 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``range(1, SIDES)`` with an unused loop variable, if one iteration is missing."""
     if not any(isinstance(each, (*DRIVING_CRITERIA, WordSequence)) for each in clues.lost):
         return
-    for listing, each in collect_statements(clues):
-        call = next((one for one in each.calls if one.name == "range"), None)
-        if each.keyword != "for" or call is None or len(call.arguments) != 2 or call.arguments[0] != ("1",):
+    for listing, statement in collect_statements(clues):
+        call = next((one for one in statement.calls if one.name == "range"), None)
+        if statement.keyword != "for" or call is None or len(call.arguments) != 2 or call.arguments[0] != ("1",):
             continue
-        end, variable = listing.code.number(call.arguments[1]), each.tokens[1]
-        used = any(one.has_token(variable) for one in listing.code.list_body(each))
-        counts = {str(int(end)), str(int(end) - 1)} if end is not None and end > 1 else set()
-        told = (set(re.findall(r"\d+", _join_messages(clues, one.id))) for one in clues.lost)
-        if end is not None and counts and not used and any(counts <= numbers for numbers in told):
-            last = join_tokens(call.arguments[1])
+        end, variable = listing.code.number(call.arguments[1]), statement.tokens[1]
+        is_used = any(one.has_token(variable) for one in listing.code.list_body(statement))
+        pass_counts = {str(int(end)), str(int(end) - 1)} if end is not None and end > 1 else set()
+        number_sets = (set(re.findall(r"\d+", _join_messages(clues, one.id))) for one in clues.lost)
+        if end is not None and pass_counts and not is_used and any(pass_counts <= numbers for numbers in number_sets):
+            end_code = join_tokens(call.arguments[1])
             yield (
-                f"{listing.locate(each.line)}: range(1, {last}) counts from 1 to {end - 1:g}, so the loop runs "
+                f"{listing.locate(statement.line)}: range(1, {end_code}) counts from 1 to {end - 1:g}, so the "
+                "loop runs "
                 f"{end - 1:g} "
-                f"times. To run {end:g} times, write range({last})"
+                f"times. To run {end:g} times, write range({end_code})"
             )
             return
 
@@ -52,41 +53,52 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
 def hint_about_range_step(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``range(10, 101)``, if the required numbers have a larger step."""
     for criterion in clues.lost:
-        found = (
+        match = (
             _OTHER_NUMBER.search(_join_messages(clues, criterion.id)) if isinstance(criterion, WordSequence) else None
         )
-        if found is None:
+        if match is None:
             continue
-        before, came, wanted = map(int, found.groups())
-        for listing, each in collect_statements(clues):
-            call = next((one for one in each.calls if one.name == "range"), None)
+        last_number, actual, expected = map(int, match.groups())
+        for listing, statement in collect_statements(clues):
+            call = next((one for one in statement.calls if one.name == "range"), None)
             numbers = [listing.code.number(one) for one in call.arguments] if call is not None else []
-            begin, end, step = (*numbers, 1.0, 1.0)[:3] if len(numbers) in (2, 3) else (None, None, None)
-            if call is None or begin is None or end is None or step != came - before or not begin <= before < end:
+            start, end, step = (*numbers, 1.0, 1.0)[:3] if len(numbers) in (2, 3) else (None, None, None)
+            if (
+                call is None
+                or start is None
+                or end is None
+                or step != actual - last_number
+                or not start <= last_number < end
+            ):
                 continue
-            right = (*map(join_tokens, call.arguments[:2]), str(wanted - before))
-            shown = f"range({format_arguments(call.arguments)})"
+            arguments = (*map(join_tokens, call.arguments[:2]), str(expected - last_number))
+            range_call = f"range({format_arguments(call.arguments)})"
             yield (
-                f"{listing.locate(each.line)}: {shown} counts in steps of {step:g}, so {came} comes after "
-                f"{before}, and "
-                f"not {wanted}. The third number is the step: write range({', '.join(right)})"
+                f"{listing.locate(statement.line)}: {range_call} counts in steps of {step:g}, so {actual} comes after "
+                f"{last_number}, and "
+                f"not {expected}. The third number is the step: write range({', '.join(arguments)})"
             )
             return
 
 
 def hint_about_first_value(clues: Clues) -> Iterator[str]:
     """Yield a hint on a variable for the first value that each later value overwrites."""
-    for listing, each in collect_statements(clues):
-        name = each.target
-        inner = next((one for one in listing.code.list_enclosing(each)), None)
-        if not _FIRST_VALUE_NAME.match(name) or inner is None or inner.keyword != "if" or name in inner.condition:
+    for listing, statement in collect_statements(clues):
+        name = statement.target
+        enclosing = next((one for one in listing.code.list_enclosing(statement)), None)
+        if (
+            not _FIRST_VALUE_NAME.match(name)
+            or enclosing is None
+            or enclosing.keyword != "if"
+            or name in enclosing.condition
+        ):
             continue
         is_empty = any(one.tokens == (name, "=", "None") and not one.indent for one in listing.code.statements)
-        if is_empty and any(one.keyword in LOOPS for one in listing.code.list_enclosing(each)):
+        if is_empty and any(one.keyword in LOOPS for one in listing.code.list_enclosing(statement)):
             yield (
-                f"{listing.locate(each.line)} sets {name} again each time that the if in line {inner.line} is "
+                f"{listing.locate(statement.line)} sets {name} again each time that the if in line {enclosing.line} is "
                 "true, so it "
-                f'has the last value. For the first, write "if {join_tokens(inner.condition)} and {name} is None:"'
+                f'has the last value. For the first, write "if {join_tokens(enclosing.condition)} and {name} is None:"'
             )
             return
 
@@ -95,26 +107,29 @@ def hint_about_first_message(clues: Clues) -> Iterator[str]:
     """Yield a hint on code that reads the first message of the queue, if the last is required."""
     if not any(isinstance(each, Says) and "last text that" in _join_messages(clues, each.id) for each in clues.lost):
         return
-    for listing, each in collect_statements(clues):
-        for place, token in enumerate(each.tokens):
-            if token.strip("\"'") == "messages" and each.tokens[place + 1 : place + 5] == ("]", "[", "0", "]"):
-                yield f"{listing.locate(each.line)} takes the first message of the queue, [0]. Write [-1] for the last"
+    for listing, statement in collect_statements(clues):
+        for index, token in enumerate(statement.tokens):
+            if token.strip("\"'") == "messages" and statement.tokens[index + 1 : index + 5] == ("]", "[", "0", "]"):
+                yield (
+                    f"{listing.locate(statement.line)} takes the first message of the queue, [0]. Write [-1] for the "
+                    "last"
+                )
                 return
 
 
 def hint_about_spoken_name(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say("count")``: a variable's name instead of its value."""
-    for listing, each in collect_statements(clues):
-        for call in each.calls:
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
             text = call.arguments[0][0] if call.arguments and len(call.arguments[0]) == 1 else ""
             name = text[1:-1]
             is_output = call.name in ("say", "print") and name in (*clues.spoken, *clues.printed)
             if is_output and text[:1] in ("'", '"') and _is_variable(name, listing):
-                fixed = format_arguments((("str", "(", name, ")"), *call.arguments[1:]))
+                arguments = format_arguments((("str", "(", name, ")"), *call.arguments[1:]))
                 yield (
-                    f"{listing.locate(each.line)} {call.name}s the word {text} and not the value of {name}, "
+                    f"{listing.locate(statement.line)} {call.name}s the word {text} and not the value of {name}, "
                     "because it is "
-                    f"in quotes. Write {call.name}({fixed})"
+                    f"in quotes. Write {call.name}({arguments})"
                 )
                 return
 
@@ -129,16 +144,19 @@ def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
     for listing in clues.programs if any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost) else ():
         for head in listing.code.list_functions():
             body = listing.code.list_body(head)
-            driving = next((each for each in body if has_motor_call(each, LIMITED_MOVES)), None)
+            drive_statement = next((each for each in body if has_motor_call(each, LIMITED_MOVES)), None)
             name = head.tokens[1]
-            if driving is None or not any(call.name == name for each in listing.code.statements for call in each.calls):
+            if drive_statement is None or not any(
+                call.name == name for each in listing.code.statements for call in each.calls
+            ):
                 continue
             for parameter in _list_parameters(head):
                 if not any(each.has_token(parameter) for each in body):
-                    call = next(one for one in driving.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
+                    call = next(one for one in drive_statement.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
                     amount = join_tokens(call.arguments[-1]) if call.arguments else "the number"
                     yield (
-                        f"{listing.locate(driving.line)}: {name} never uses its parameter {parameter}, so it does "
+                        f"{listing.locate(drive_statement.line)}: {name} never uses its parameter {parameter}, so "
+                        "it does "
                         "the same "
                         f"with each value. Write {parameter} in place of {amount} if that is meant"
                     )
@@ -149,13 +167,14 @@ def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
     """Yield a hint on a program that only drives forwards, if the robot should come back."""
     if not any(isinstance(each, Excursions) for each in clues.lost):
         return
-    moving = [(listing, each) for listing, each in collect_statements(clues) if has_motor_call(each, LIMITED_MOVES)]
-    calls = [call for _, each in moving for call in each.calls if call.name.rpartition(".")[2] in LIMITED_MOVES]
-    turns = any("turn" in call.name or "-" in "".join(map("".join, call.arguments)) for call in calls)
-    if len(moving) > 1 and not turns:
-        listing, each = moving[-1]
+    moves = [(listing, each) for listing, each in collect_statements(clues) if has_motor_call(each, LIMITED_MOVES)]
+    calls = [call for _, each in moves for call in each.calls if call.name.rpartition(".")[2] in LIMITED_MOVES]
+    has_turn = any("turn" in call.name or "-" in "".join(map("".join, call.arguments)) for call in calls)
+    if len(moves) > 1 and not has_turn:
+        listing, statement = moves[-1]
         yield (
-            f"{listing.locate(each.line)} drives forwards like the lines before it, so the robot never comes back. "
+            f"{listing.locate(statement.line)} drives forwards like the lines before it, so the robot never comes "
+            "back. "
             "Write - before both speeds to drive backwards"
         )
 
@@ -172,12 +191,12 @@ def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:
                 continue
             target = to_relative_position(corner, criterion.x, criterion.y)
             end = to_relative_position(corner, recording.end.x, recording.end.y)
-            off = math.hypot(target[0] - end[0], target[1] + end[1])
-            if abs(target[1]) > _AWAY and target[1] * end[1] < 0 and off < max(criterion.tolerance, _AWAY):
-                listing, each = turn
+            error = math.hypot(target[0] - end[0], target[1] + end[1])
+            if abs(target[1]) > _AWAY and target[1] * end[1] < 0 and error < max(criterion.tolerance, _AWAY):
+                listing, statement = turn
                 side = "left" if target[1] > 0 else "right"
                 yield (
-                    f"{listing.locate(each.line)} turns the robot to the wrong side: it ends as far from its way "
+                    f"{listing.locate(statement.line)} turns the robot to the wrong side: it ends as far from its way "
                     "as the "
                     f"target, but on the other side. Turn {side} there"
                 )
@@ -186,30 +205,32 @@ def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:
 
 def _find_last_turn(clues: Clues) -> tuple[Listing, Statement] | None:
     """Return the last statement outside functions that turns the robot, directly or by a function; or None."""
-    found = None
-    for listing, each in collect_statements(clues):
-        turning = {
+    last_turn = None
+    for listing, statement in collect_statements(clues):
+        turn_functions = {
             head.tokens[1]
             for head in listing.code.list_functions()
             if any(call.name.startswith("tank_turn.") for one in listing.code.list_body(head) for call in one.calls)
         }
-        outside = not any(one.keyword == "def" for one in listing.code.list_enclosing(each))
-        if outside and any(call.name.startswith("tank_turn.") or call.name in turning for call in each.calls):
-            found = listing, each
-    return found
+        is_outside = not any(one.keyword == "def" for one in listing.code.list_enclosing(statement))
+        if is_outside and any(
+            call.name.startswith("tank_turn.") or call.name in turn_functions for call in statement.calls
+        ):
+            last_turn = listing, statement
+    return last_turn
 
 
 def _find_last_corner(recording: Recording) -> Pose | None:
     """Return the pose where the robot began its last turn, with the heading before it; None if it did not turn."""
     headings = [recording.start.heading, *recording.ticks.heading]
-    still = len(headings) - 1
-    while still > 0 and abs(headings[still] - headings[still - 1]) < 0.02:
-        still -= 1
-    while still > 0 and abs(headings[still] - headings[still - 1]) >= 0.02:
-        still -= 1
-    if still <= 0:
+    index = len(headings) - 1
+    while index > 0 and abs(headings[index] - headings[index - 1]) < 0.02:
+        index -= 1
+    while index > 0 and abs(headings[index] - headings[index - 1]) >= 0.02:
+        index -= 1
+    if index <= 0:
         return None
-    return Pose(float(recording.ticks.x[still - 1]), float(recording.ticks.y[still - 1]), float(headings[still]))
+    return Pose(float(recording.ticks.x[index - 1]), float(recording.ticks.y[index - 1]), float(headings[index]))
 
 
 def _list_parameters(head: Statement) -> list[str]:

@@ -28,8 +28,8 @@ _MAX_ITERATIONS = 100_000
 def hint_about_limits(clues: Clues) -> Iterator[str]:
     """Yield hints with the line where a program was stopped and why the loop around it does not end."""
     for fault in dict.fromkeys(_collect_limit_faults(clues)):
-        where, listing = describe_fault_line(fault, clues), find_listing(fault, clues)
-        if not where or listing is None:
+        location, listing = describe_fault_line(fault, clues), find_listing(fault, clues)
+        if not location or listing is None:
             continue
         statement = listing.code.find_statement(fault.line)
         if statement is None:
@@ -42,8 +42,8 @@ def _collect_limit_faults(clues: Clues) -> Iterator[Fault]:
     """Yield the faults that ended trials at a limit. Time limits count only if a criterion reports them."""
     for recording in clues.recordings:
         for fault in collect_faults(recording)[:1]:
-            told = any(fault.message in each.message for each in clues.results)
-            if fault.verdict is Verdict.CPU_LIMIT or (fault.verdict is Verdict.TIME_LIMIT and told):
+            is_reported = any(fault.message in each.message for each in clues.results)
+            if fault.verdict is Verdict.CPU_LIMIT or (fault.verdict is Verdict.TIME_LIMIT and is_reported):
                 yield fault
 
 
@@ -54,20 +54,20 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
         return f"{listing.locate(statement.line)}: {amount}"
     loops = code.list_enclosing_loops(statement)
     for loop in loops:
-        why = _explain_endless_loop(loop, code, listing, fault)
-        if why:
-            return why
-    up = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
-    who = "responder" if fault.who == "responder" else "program"
+        explanation = _explain_endless_loop(loop, code, listing, fault)
+        if explanation:
+            return explanation
+    stop_event = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
+    part_name = "responder" if fault.who == "responder" else "program"
     if loops:
         head = join_tokens(loops[0].tokens)
         return (
-            f'{listing.locate(loops[0].line)}: the {who} was still in the loop "{head}" when {up}. '
+            f'{listing.locate(loops[0].line)}: the {part_name} was still in the loop "{head}" when {stop_event}. '
             f"{_suggest_loop_fix(loops[0], code, fault)}"
         )
     return (
-        f'{listing.locate(statement.line)}: the {who} was still in the line "{join_tokens(statement.tokens)}" '
-        f"when {up}. "
+        f'{listing.locate(statement.line)}: the {part_name} was still in the line "{join_tokens(statement.tokens)}" '
+        f"when {stop_event}. "
         "Check what it waits for, and whether that ever happens"
     )
 
@@ -80,18 +80,18 @@ def _suggest_loop_fix(loop: Statement, code: CodeStatements, fault: Fault) -> st
     return "Check when its condition becomes false, or end it with break"
 
 
-def describe_large_amount(code: CodeStatements, statement: Statement, least: float) -> str:
+def describe_large_amount(code: CodeStatements, statement: Statement, time_limit: float) -> str:
     """Return a hint that a call has a time or an amount in the wrong unit; otherwise empty."""
     for call in statement.calls:
-        known = AMOUNTS.get(call.name.rpartition(".")[2])
-        plain = [each for each in call.arguments if "=" not in each]
-        number = code.number(plain[-1]) if plain else None
-        if known is None or number is None or abs(number) < min(known[0], least or known[0]):
+        usual_amount = AMOUNTS.get(call.name.rpartition(".")[2])
+        arguments = [each for each in call.arguments if "=" not in each]
+        number = code.number(arguments[-1]) if arguments else None
+        if usual_amount is None or number is None or abs(number) < min(usual_amount[0], time_limit or usual_amount[0]):
             continue
-        most, unit, other = known
-        if abs(number) < most / 2:
+        maximum, unit, other_unit = usual_amount
+        if abs(number) < maximum / 2:
             continue
-        if other == "milliseconds":
+        if other_unit == "milliseconds":
             fix = f"{number:g} milliseconds are {number / 1000:g} seconds: write {number / 1000:g}"
         else:
             fix = f"For {number:g} degrees of the wheels write on_for_degrees, or {number / 360:g} rotations"
@@ -102,47 +102,58 @@ def describe_large_amount(code: CodeStatements, statement: Statement, least: flo
 def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
     """Return why a loop does not end; empty if that is not clear."""
     body = code.list_body(loop)
-    where = listing.locate(loop.line)
+    location = listing.locate(loop.line)
     if loop.keyword == "for":
-        turns = next((call for call in loop.calls if call.name == "range"), None)
-        numbers = [number for each in (turns.arguments if turns else ()) if (number := code.number(each)) is not None]
+        range_call = next((call for call in loop.calls if call.name == "range"), None)
+        numbers = [
+            number for each in (range_call.arguments if range_call else ()) if (number := code.number(each)) is not None
+        ]
         if numbers and max(map(abs, numbers)) >= _MAX_ITERATIONS:
-            return f"{where}: this loop has {max(numbers):,.0f} passes, which is too many. Use a smaller number"
+            return f"{location}: this loop has {max(numbers):,.0f} passes, which is too many. Use a smaller number"
         return ""
     head, condition = join_tokens(loop.tokens), loop.condition
-    for each in body:
-        effect = describe_discarded_value(each, code)
-        if effect and any(token in condition for token in each.tokens if is_name(token)):
-            never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-            return f"{listing.locate(each.line)}: {effect}, {never}. {suggest_correct_statement(each)}"
+    for statement in body:
+        effect = describe_discarded_value(statement, code)
+        if effect and any(token in condition for token in statement.tokens if is_name(token)):
+            consequence = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
+            return f"{listing.locate(statement.line)}: {effect}, {consequence}. {suggest_correct_statement(statement)}"
     if condition in (("True",), ("1",), ("not", "False")):
-        once = _describe_stale_reading(loop, body, code)
-        if once:
-            return f"{where}: {once}"
+        stale_reading = _describe_stale_reading(loop, body, code)
+        if stale_reading:
+            return f"{location}: {stale_reading}"
         if any(each.keyword in ("break", "return") for each in body):
             return ""
         return (
-            f"{where}: {head[:-1]} repeats for ever{_describe_missing_actions(body, fault)}. "
+            f"{location}: {head[:-1]} repeats for ever{_describe_missing_actions(body, fault)}. "
             f"{_suggest_loop_end(body, fault)}"
         )
-    always = explain_always_true(condition, code)
-    if always:
-        return f"{where}: {head[:-1]} never ends: {always}"
+    explanation = explain_always_true(condition, code)
+    if explanation:
+        return f"{location}: {head[:-1]} never ends: {explanation}"
     step = _find_wrong_step(loop, body)
     if step:
-        each, effect, fix = step
-        never = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-        return f"{listing.locate(each.line)}: {join_tokens(each.tokens)} {effect}, {never}. {fix}"
+        statement, effect, fix = step
+        consequence = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
+        return f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)} {effect}, {consequence}. {fix}"
     names = {token for place, token in enumerate(condition) if is_name(token) and token not in _KEYWORDS}
-    reads = any(token in (".", "(") for token in condition)
-    changed = {name for each in body for name in each.bound_names}
+    has_reading = any(token in (".", "(") for token in condition)
+    assigned_names = {name for each in body for name in each.bound_names}
     calls = {call.name for each in body for call in each.calls}
-    if names and not reads and not names & changed and not any(each.keyword == "global" for each in code.statements):
-        return f"{where}: {head[:-1]} never ends: {_describe_unchanged_names(sorted(names), loop, code, calls)}"
-    exact = [place for place, token in enumerate(condition) if token in ("!=", "==")]
-    if exact and any(token in PROPERTIES for token in condition) and any(each[:1].isdigit() for each in condition):
-        past = "the value can jump past the number between two readings"
-        return f"{where}: {head[:-1]} does not end: {past}. Compare with < or >"
+    if (
+        names
+        and not has_reading
+        and not names & assigned_names
+        and not any(each.keyword == "global" for each in code.statements)
+    ):
+        return f"{location}: {head[:-1]} never ends: {_describe_unchanged_names(sorted(names), loop, code, calls)}"
+    equality_indices = [place for place, token in enumerate(condition) if token in ("!=", "==")]
+    if (
+        equality_indices
+        and any(token in PROPERTIES for token in condition)
+        and any(each[:1].isdigit() for each in condition)
+    ):
+        reason = "the value can jump past the number between two readings"
+        return f"{location}: {head[:-1]} does not end: {reason}. Compare with < or >"
     return ""
 
 
@@ -152,16 +163,16 @@ def _find_wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statem
     if len(condition) < 3 or condition[1] not in _DIVERGING_SIGNS or not is_name(condition[0]):
         return None
     name, sign = condition[0], condition[1]
-    for each in body:
-        if each.parent != loop.number:
+    for statement in body:
+        if statement.parent != loop.number:
             continue
-        if each.target == name and len(each.tokens) == 3 and not is_name(each.tokens[2]):
-            again = f"gives {name} the same value in each pass"
-            return each, again, "Move it to the line before the loop, without indentation"
-        direction = _find_step_sign(each, name)
+        if statement.target == name and len(statement.tokens) == 3 and not is_name(statement.tokens[2]):
+            effect = f"gives {name} the same value in each pass"
+            return statement, effect, "Move it to the line before the loop, without indentation"
+        direction = _find_step_sign(statement, name)
         if direction == _DIVERGING_SIGNS[sign]:
-            away, towards = ("grow", "-") if direction == "+" else ("shrink", "+")
-            return each, f"makes {name} {away}", f"Write {towards} in place of {direction}"
+            verb, correct_sign = ("grow", "-") if direction == "+" else ("shrink", "+")
+            return statement, f"makes {name} {verb}", f"Write {correct_sign} in place of {direction}"
     return None
 
 
@@ -183,26 +194,29 @@ def _describe_stale_reading(loop: Statement, body: Sequence[Statement], code: Co
     """Return a hint on a reading that the loop uses but that is read only once, before it."""
     if any(_is_reading(each) for each in body):
         return ""
-    changed = {name for each in body for name in each.bound_names}
-    for each in code.statements[: loop.number]:
+    assigned_names = {name for each in body for name in each.bound_names}
+    for statement in code.statements[: loop.number]:
         if (
-            each.target
-            and _is_reading(each)
-            and each.target not in changed
-            and any(one.has_token(each.target) for one in body)
+            statement.target
+            and _is_reading(statement)
+            and statement.target not in assigned_names
+            and any(one.has_token(statement.target) for one in body)
         ):
-            again = join_tokens(each.tokens)
-            return f"{each.target} is read once, in line {each.line}, and not again. Repeat {again} in the loop"
+            reading_code = join_tokens(statement.tokens)
+            return (
+                f"{statement.target} is read once, in line {statement.line}, and not again. Repeat {reading_code} in "
+                "the loop"
+            )
     return ""
 
 
 def _describe_missing_actions(body: Sequence[Statement], fault: Fault) -> str:
-    missing = []
+    missing_actions = []
     if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder":
-        missing.append("nothing in it waits")
+        missing_actions.append("nothing in it waits")
     if not any(_is_reading(each) for each in body) and fault.who != "responder":
-        missing.append("it reads no sensor")
-    return f", and {' and '.join(missing)}" if missing else ""
+        missing_actions.append("it reads no sensor")
+    return f", and {' and '.join(missing_actions)}" if missing_actions else ""
 
 
 def _suggest_loop_end(body: Sequence[Statement], fault: Fault) -> str:
@@ -221,8 +235,8 @@ def describe_discarded_value(statement: Statement, code: CodeStatements) -> str:
     operators = [token for token in tokens if token in ("+", "-", "*", "/", "==", "<", ">")]
     if not is_name(tokens[0]) or not operators or any(each.endswith("=") and each != "==" for each in tokens):
         return ""
-    plain = all(is_name(each) or each in "+-*/.==<>" or each[0].isdigit() for each in tokens)
-    return f"{join_tokens(tokens)} has no effect" if plain and tokens[0] not in _STATEMENTS else ""
+    is_plain = all(is_name(each) or each in "+-*/.==<>" or each[0].isdigit() for each in tokens)
+    return f"{join_tokens(tokens)} has no effect" if is_plain and tokens[0] not in _STATEMENTS else ""
 
 
 def _has_reversed_operator(statement: Statement, code: CodeStatements) -> bool:
@@ -250,22 +264,26 @@ def suggest_correct_statement(statement: Statement) -> str:
 
 def explain_always_true(condition: Sequence[str], code: CodeStatements) -> str:
     """Return why a comparison of a reading with a number is always true; empty if it is not."""
-    place = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
-    if place is None or any(token in ("and", "or", "not") for token in condition):
+    sign_index = next((at for at, token in enumerate(condition) if token in ("<", ">", "<=", ">=")), None)
+    if sign_index is None or any(token in ("and", "or", "not") for token in condition):
         return ""
-    sign, name = condition[place], find_reading(condition[:place], code)
-    number = code.number(condition[place + 1 :])
+    sign, name = condition[sign_index], find_reading(condition[:sign_index], code)
+    number = code.number(condition[sign_index + 1 :])
     if not name or number is None:
         return ""
-    least, most, unit = READINGS[name]
-    holds = {">=": number <= least, ">": number < least, "<=": number >= most, "<": number > most}[sign]
-    if not holds:
+    minimum, maximum, unit = READINGS[name]
+    is_always_true = {">=": number <= minimum, ">": number < minimum, "<=": number >= maximum, "<": number > maximum}[
+        sign
+    ]
+    if not is_always_true:
         return ""
-    what = join_tokens(condition)
-    better = (
-        f"Write {sign[0]} {number:g}" if sign in (">=", "<=") and number in (least, most) else "Choose a number within"
+    condition_text = join_tokens(condition)
+    advice = (
+        f"Write {sign[0]} {number:g}"
+        if sign in (">=", "<=") and number in (minimum, maximum)
+        else "Choose a number within"
     )
-    return f"{what} is always true, because {name} {unit}. {better}"
+    return f"{condition_text} is always true, because {name} {unit}. {advice}"
 
 
 def find_reading(tokens: Sequence[str], code: CodeStatements) -> str:
@@ -278,23 +296,24 @@ def _find_source_token(tokens: Sequence[str], code: CodeStatements) -> str:
     """Return the last token of the value assigned to a name; otherwise empty."""
     if len(tokens) != 1:
         return ""
-    given = next((each for each in code.statements if each.target == tokens[0]), None)
-    return given.tokens[-1] if given is not None else ""
+    assignment = next((each for each in code.statements if each.target == tokens[0]), None)
+    return assignment.tokens[-1] if assignment is not None else ""
 
 
 def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
-    listed = " and ".join(names[:2])
-    change = "does not change" if len(names) == 1 else "do not change"
+    name_list = " and ".join(names[:2])
+    verb = "does not change" if len(names) == 1 else "do not change"
     for name in names:
-        given = next(
+        assignment = next(
             (each for each in code.statements[: loop.number] if each.target == name and _is_reading(each)), None
         )
-        if given is not None:
+        if assignment is not None:
             return (
-                f"{name} is read once, in line {given.line}, and not again. Repeat {join_tokens(given.tokens)} in the "
+                f"{name} is read once, in line {assignment.line}, and not again. Repeat "
+                f"{join_tokens(assignment.tokens)} in the "
                 "loop"
             )
-    return f"{listed} {change} in the loop. Assign {names[0]} in the loop"
+    return f"{name_list} {verb} in the loop. Assign {names[0]} in the loop"
 
 
 def _is_reading(statement: Statement) -> bool:

@@ -31,59 +31,67 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
         isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost
     ):
         return
-    moving = [
+    moves = [
         (listing, each)
         for listing, each in collect_statements(clues)
         if has_motor_call(each, CONTINUOUS_MOVES | LIMITED_MOVES)
     ]
-    slow = [pair for pair in moving if _is_zero_move(*pair)]
-    unwaited = [pair for pair in moving if _has_no_block(pair[1])]
-    switched = [pair for pair in moving if has_motor_call(pair[1], CONTINUOUS_MOVES)]
-    if slow and len(slow) == len(moving):
-        listing, each = slow[0]
+    zero_moves = [pair for pair in moves if _is_zero_move(*pair)]
+    unwaited_moves = [pair for pair in moves if _has_no_block(pair[1])]
+    started_moves = [pair for pair in moves if has_motor_call(pair[1], CONTINUOUS_MOVES)]
+    if zero_moves and len(zero_moves) == len(moves):
+        listing, statement = zero_moves[0]
         yield (
-            f"{listing.locate(each.line)} drives with speed or length 0, so the robot never moved. Write a larger "
+            f"{listing.locate(statement.line)} drives with speed or length 0, so the robot never moved. Write a larger "
             "number"
         )
-    elif unwaited:
-        listing, each = unwaited[0]
+    elif unwaited_moves:
+        listing, statement = unwaited_moves[0]
         yield (
-            f"{listing.locate(each.line)}: with block=False the program does not wait, and it ends before the "
+            f"{listing.locate(statement.line)}: with block=False the program does not wait, and it ends before the "
             "robot moves. "
             "Remove block=False"
         )
-    elif switched and _list_enclosing_conditions(*switched[0]):
-        listing, each = switched[0]
-        head = _list_enclosing_conditions(listing, each)[0]
+    elif started_moves and _list_enclosing_conditions(*started_moves[0]):
+        listing, statement = started_moves[0]
+        head = _list_enclosing_conditions(listing, statement)[0]
         yield (
-            f"{listing.locate(head.line)}: the robot never moved. Line {each.line} runs only if "
+            f"{listing.locate(head.line)}: the robot never moved. Line {statement.line} runs only if "
             f"{join_tokens(head.condition)} "
             "is true. Print the values in it, and check the condition"
         )
-    elif switched:
-        listing, each = switched[0]
-        below = next(
-            (other for other in listing.code.list_following(each) if has_motor_call(other, frozenset({"off", "stop"}))),
+    elif started_moves:
+        listing, statement = started_moves[0]
+        stop_statement = next(
+            (
+                other
+                for other in listing.code.list_following(statement)
+                if has_motor_call(other, frozenset({"off", "stop"}))
+            ),
             None,
         )
-        then = f"line {below.line} switches them off at once" if below else "the program ends at once"
+        consequence = (
+            f"line {stop_statement.line} switches them off at once" if stop_statement else "the program ends at once"
+        )
         yield (
-            f"{listing.locate(each.line)} switches the motors on, but nothing waits after it: {then}, and the "
+            f"{listing.locate(statement.line)} switches the motors on, but nothing waits after it: {consequence}, "
+            "and the "
             "robot never "
             "moved. Add time.sleep(2), with import time above, or use on_for_seconds"
         )
-    elif moving and all(_list_enclosing_conditions(*pair) for pair in moving):
-        listing, each = moving[0]
-        head = _list_enclosing_conditions(listing, each)[0]
+    elif moves and all(_list_enclosing_conditions(*pair) for pair in moves):
+        listing, statement = moves[0]
+        head = _list_enclosing_conditions(listing, statement)[0]
         yield (
-            f"{listing.locate(each.line)} moves the robot, but the program never came to it: the robot never moved. "
+            f"{listing.locate(statement.line)} moves the robot, but the program never came to it: the robot never "
+            "moved. "
             f"Check the condition in line {head.line}: {join_tokens(head.condition)}"
         )
-    elif moving or not any(listing.code.statements for listing in clues.programs):
+    elif moves or not any(listing.code.statements for listing in clues.programs):
         return
     elif any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost):
-        how = "for example with tank_drive.on_for_seconds(20, 20, 1)"
-        yield f"the robot never moved; expected the program to switch its motors on, {how}"
+        example = "for example with tank_drive.on_for_seconds(20, 20, 1)"
+        yield f"the robot never moved; expected the program to switch its motors on, {example}"
 
 
 def _has_no_block(statement: Statement) -> bool:
@@ -92,20 +100,22 @@ def _has_no_block(statement: Statement) -> bool:
 
 def _list_enclosing_conditions(listing: Listing, statement: Statement) -> list[Statement]:
     """Return the enclosing ``if`` and ``while`` statements that may be false, the innermost first."""
-    around = listing.code.list_enclosing(statement)
-    return [each for each in around if each.keyword in ("if", "elif", "while") and each.condition != ("True",)]
+    enclosing_statements = listing.code.list_enclosing(statement)
+    return [
+        each for each in enclosing_statements if each.keyword in ("if", "elif", "while") and each.condition != ("True",)
+    ]
 
 
 def hint_about_units(clues: Clues) -> Iterator[str]:
     """Yield a hint on an amount in the wrong unit, or a reading compared with a value outside its range."""
-    for listing, each in collect_statements(clues):
-        amount = describe_large_amount(listing.code, each, 0)
-        if amount and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
-            yield f"{listing.locate(each.line)}: {amount}"
+    for listing, statement in collect_statements(clues):
+        amount_hint = describe_large_amount(listing.code, statement, 0)
+        if amount_hint and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
+            yield f"{listing.locate(statement.line)}: {amount_hint}"
             return
-        range_ = _describe_impossible_threshold(listing, each)
-        if range_:
-            yield f"{listing.locate(each.line)}: {range_}"
+        range_hint = _describe_impossible_threshold(listing, statement)
+        if range_hint:
+            yield f"{listing.locate(statement.line)}: {range_hint}"
             return
 
 
@@ -113,19 +123,27 @@ def hint_about_distances(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that a distance threshold in centimetres stopped in the wrong place."""
     if not any(isinstance(each, STOPPING_CRITERIA) for each in clues.lost):
         return
-    found = [
+    comparisons = [
         (listing, each, number)
         for listing, each in collect_statements(clues)
         if (number := _find_compared_number(listing, each, "distance_centimeters")) is not None
     ]
-    for listing, each, number in found[-1:]:
+    for listing, statement, number in comparisons[-1:]:
         if number < 10:
             continue
-        what = next((criterion for criterion in clues.results if criterion.evidence and not criterion.marks), None)
-        seen = next((one.message for one in what.evidence if not one.passed), "") if what is not None else ""
+        failed_result = next(
+            (criterion for criterion in clues.results if criterion.evidence and not criterion.marks), None
+        )
+        failure_message = (
+            next((one.message for one in failed_result.evidence if not one.passed), "")
+            if failed_result is not None
+            else ""
+        )
         yield (
-            f"{listing.locate(each.line)} compares distance_centimeters with {number:g}: that is in centimetres, so "
-            f"{10 * number:g} mm. For {number:g} mm write {number / 10:g}{'. ' if seen else ''}{seen.rstrip('.')}"
+            f"{listing.locate(statement.line)} compares distance_centimeters with {number:g}: that is in "
+            "centimetres, so "
+            f"{10 * number:g} mm. For {number:g} mm write "
+            f"{number / 10:g}{'. ' if failure_message else ''}{failure_message.rstrip('.')}"
         )
 
 
@@ -134,18 +152,19 @@ def hint_about_turns(clues: Clues) -> Iterator[str]:
     turns = list(_collect_turning_calls(clues))
     if len(turns) != 1:
         return
-    listing, each, call = turns[0]
+    listing, statement, call = turns[0]
     amount = listing.code.number(call.arguments[-1]) if call.arguments else None
-    for criterion, told in _collect_failure_messages(clues):
-        asked, turned = _find_required_turn(criterion), _TURNED.search(told)
-        if asked is None or turned is None or amount is None or not float(turned[1]):
+    for criterion, message in _collect_failure_messages(clues):
+        required_turn, turn_match = _find_required_turn(criterion), _TURNED.search(message)
+        if required_turn is None or turn_match is None or amount is None or not float(turn_match[1]):
             continue
-        if listing.code.list_enclosing_loops(each) and not isinstance(criterion, Drawing):
+        if listing.code.list_enclosing_loops(statement) and not isinstance(criterion, Drawing):
             continue
-        middle = abs(sum(asked) / 2)
+        middle = abs(sum(required_turn) / 2)
         yield (
-            f"{listing.locate(each.line)}: the robot turned {turned[1]}°; expected {asked[0]:g} to {asked[1]:g}°. "
-            f"Change {amount:g} to about {_format_number(amount * middle / float(turned[1]))}"
+            f"{listing.locate(statement.line)}: the robot turned {turn_match[1]}°; expected {required_turn[0]:g} "
+            f"to {required_turn[1]:g}°. "
+            f"Change {amount:g} to about {_format_number(amount * middle / float(turn_match[1]))}"
         )
         return
 
@@ -157,12 +176,12 @@ def _format_number(number: float) -> str:
 def hint_about_curves(clues: Clues) -> Iterator[str]:
     """Yield a hint on a turn that is a curve instead of on the spot, if corners are required."""
     corners = any(isinstance(each, Drawing) for each in clues.lost) and not clues.is_stationary
-    for listing, each, call in _collect_turning_calls(clues):
+    for listing, statement, call in _collect_turning_calls(clues):
         steering = listing.code.number(call.arguments[0]) if call.arguments else None
         if corners and steering is not None and 0 < abs(steering) < 100:
             spot = 100 if steering > 0 else -100
             yield (
-                f"{listing.locate(each.line)} steers by {steering:g}, so the robot drives a curve. "
+                f"{listing.locate(statement.line)} steers by {steering:g}, so the robot drives a curve. "
                 f"To turn on the spot, write {spot} in place of {steering:g}"
             )
             return
@@ -172,22 +191,25 @@ def hint_about_speeds(clues: Clues) -> Iterator[str]:
     """Yield a hint on unequal or negative wheel speeds, if the robot should drive straight forwards."""
     if clues.is_stationary or not any(_is_straight_required(criterion) for criterion in clues.lost):
         return
-    for listing, each in collect_statements(clues):
-        for call in each.calls:
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
             if (
                 not call.name.startswith("tank_drive.")
                 or call.name.rpartition(".")[2] not in LIMITED_MOVES | CONTINUOUS_MOVES
             ):
                 continue
-            left, right = (listing.code.number(one) for one in (*call.arguments[:2], (), ())[:2])
-            if left is None or right is None or left * right <= 0:
+            left_speed, right_speed = (listing.code.number(one) for one in (*call.arguments[:2], (), ())[:2])
+            if left_speed is None or right_speed is None or left_speed * right_speed <= 0:
                 continue
-            if left < 0:
-                yield f"{listing.locate(each.line)} drives backwards: the speeds are negative. Write positive speeds"
-                return
-            if left != right:
+            if left_speed < 0:
                 yield (
-                    f"{listing.locate(each.line)} gives the wheels the speeds {left:g} and {right:g}, so the "
+                    f"{listing.locate(statement.line)} drives backwards: the speeds are negative. Write positive speeds"
+                )
+                return
+            if left_speed != right_speed:
+                yield (
+                    f"{listing.locate(statement.line)} gives the wheels the speeds {left_speed:g} and "
+                    f"{right_speed:g}, so the "
                     "robot drives "
                     "a curve. To drive straight on, give both the same speed"
                 )
@@ -197,21 +219,23 @@ def hint_about_speeds(clues: Clues) -> Iterator[str]:
 def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
     if clues.seconds <= _IMMEDIATE_SECONDS and not any(True for _ in clues.faults):
-        for ended, condition in describe_skipped_loops(clues):
-            other = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
-            yield f"{ended}, or write {other}"
+        for sentence, condition in describe_skipped_loops(clues):
+            opposite = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
+            yield f"{sentence}, or write {opposite}"
 
 
 def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
     """Yield the first sensor loop after the motors are switched on: why it ends immediately, and its condition."""
-    for listing, each in collect_statements(clues):
-        reading = next((token for token in each.condition if token in PROPERTIES), "")
-        drives = any(has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: each.number])
-        if each.keyword == "while" and reading and drives:
+    for listing, statement in collect_statements(clues):
+        reading = next((token for token in statement.condition if token in PROPERTIES), "")
+        is_driving = any(
+            has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
+        )
+        if statement.keyword == "while" and reading and is_driving:
             unit = f" {reading} {READINGS[reading][2]}." if reading in READINGS else ""
-            condition = join_tokens(each.condition)
-            why = f"the loop ends at once, because {condition} is false from the start.{unit}"
-            yield f"{listing.locate(each.line)}: {why} Check the number", condition
+            condition = join_tokens(statement.condition)
+            reason = f"the loop ends at once, because {condition} is false from the start.{unit}"
+            yield f"{listing.locate(statement.line)}: {reason} Check the number", condition
             return
 
 
@@ -226,16 +250,18 @@ def _is_straight_required(criterion: object) -> bool:
 
 def _collect_turning_calls(clues: Clues) -> Iterator[tuple[Listing, Statement, CallInCode]]:
     """Yield the calls that turn the robot by an amount."""
-    for listing, each in collect_statements(clues):
-        for call in each.calls:
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
             if call.name.startswith("tank_turn.") and call.name.rpartition(".")[2] in LIMITED_MOVES:
-                yield listing, each, call
+                yield listing, statement, call
 
 
 def _collect_failure_messages(clues: Clues) -> Iterator[tuple[Criterion, str]]:
     """Return each criterion that lost marks, with the message of its first failure."""
-    told = {each.id: next((one.message for one in each.evidence if not one.passed), "") for each in clues.results}
-    return ((each, told.get(each.id, "")) for each in clues.lost)
+    messages_by_id = {
+        each.id: next((one.message for one in each.evidence if not one.passed), "") for each in clues.results
+    }
+    return ((each, messages_by_id.get(each.id, "")) for each in clues.lost)
 
 
 def _find_required_turn(criterion: Criterion) -> tuple[float, float] | None:
@@ -256,22 +282,22 @@ def _is_zero_move(listing: Listing, statement: Statement) -> bool:
         if call.name.rpartition(".")[2] in CONTINUOUS_MOVES | LIMITED_MOVES:
             speeds = call.arguments[1:2] if "turn" in call.name else call.arguments[:2]
             numbers = [listing.code.number(each) for each in speeds]
-            last = listing.code.number(call.arguments[-1]) if call.arguments else None
-            return bool(numbers) and (all(number == 0 for number in numbers) or last == 0)
+            amount = listing.code.number(call.arguments[-1]) if call.arguments else None
+            return bool(numbers) and (all(number == 0 for number in numbers) or amount == 0)
     return False
 
 
 def _find_compared_number(listing: Listing, statement: Statement, reading: str) -> float | None:
     tokens = statement.tokens
-    for place, token in enumerate(tokens[:-2]):
-        if token == reading and tokens[place + 1] in ("<", ">", "<=", ">="):
-            return listing.code.number(tokens[place + 2 : place + 3])
+    for index, token in enumerate(tokens[:-2]):
+        if token == reading and tokens[index + 1] in ("<", ">", "<=", ">="):
+            return listing.code.number(tokens[index + 2 : index + 3])
     return None
 
 
 def _describe_impossible_threshold(listing: Listing, statement: Statement) -> str:
-    for reading, (least, most, unit) in READINGS.items():
+    for reading, (minimum, maximum, unit) in READINGS.items():
         number = _find_compared_number(listing, statement, reading)
-        if number is not None and not least <= number <= most:
+        if number is not None and not minimum <= number <= maximum:
             return f"{reading} {unit}, so it is never near {number:g}. Choose a number within that range"
     return ""

@@ -68,20 +68,25 @@ def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None,
         return ""
     robots = {each.name for each in clues.programs}
     is_robot = listing.name in robots
-    others = (each for each in clues.listings if (each.name in robots) != is_robot)
-    other, found = next(_collect_definitions(name[1], others), (None, None))
-    if other is None or found is None or next(_collect_definitions(name[1], _list_same_process(listing, clues)), None):
+    other_listings = (each for each in clues.listings if (each.name in robots) != is_robot)
+    defining_listing, definition = next(_collect_definitions(name[1], other_listings), (None, None))
+    if (
+        defining_listing is None
+        or definition is None
+        or next(_collect_definitions(name[1], _list_same_process(listing, clues)), None)
+    ):
         return ""
-    whose = other.name.capitalize() if other.part is None else other.name
-    if found.keyword in ("import", "from"):
-        who = "the robot program" if not is_robot else "the responder"
+    owner = defining_listing.name.capitalize() if defining_listing.part is None else defining_listing.name
+    if definition.keyword in ("import", "from"):
+        process_name = "the robot program" if not is_robot else "the responder"
         return (
-            f"The import in {other.name} is only for {who}. Add {join_tokens(found.tokens)} at the top of "
+            f"The import in {defining_listing.name} is only for {process_name}. Add "
+            f"{join_tokens(definition.tokens)} at the top of "
             f"{listing.name}."
         )
-    sees = "a robot program does not see it" if is_robot else "the responder does not see it"
-    below = ", below its first line" if listing.part is None and is_robot else ""
-    return f"{whose} defines {name[1]}, but {sees}. Define {name[1]} in {listing.name} as well{below}."
+    explanation = "a robot program does not see it" if is_robot else "the responder does not see it"
+    position = ", below its first line" if listing.part is None and is_robot else ""
+    return f"{owner} defines {name[1]}, but {explanation}. Define {name[1]} in {listing.name} as well{position}."
 
 
 def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
@@ -90,10 +95,13 @@ def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _:
     if name is None or listing is None or fault.cell is None:
         return ""
     cells = [each for each in _list_same_process(listing, clues) if each.part is None]
-    later = next((each for each, _ in _collect_definitions(name[1], cells[cells.index(listing) + 1 :])), None)
-    if later is None:
+    later_cell = next((each for each, _ in _collect_definitions(name[1], cells[cells.index(listing) + 1 :])), None)
+    if later_cell is None:
         return ""
-    return f"{later.name.capitalize()} defines {name[1]}, but runs later. Move {later.name} above {listing.name}."
+    return (
+        f"{later_cell.name.capitalize()} defines {name[1]}, but runs later. Move {later_cell.name} above "
+        f"{listing.name}."
+    )
 
 
 def advise_on_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -101,9 +109,12 @@ def advise_on_later_line(fault: Fault, _: Clues, listing: Listing | None, statem
     name = UNDEFINED_NAME.match(fault.message)
     if name is None or listing is None or statement is None or listing.code.list_enclosing(statement):
         return ""
-    for each in listing.code.list_following(statement):
-        if not each.indent and each.keyword == "def" and name[1] in each.bound_names:
-            return f"Line {each.line} defines {name[1]}, but is below. Move line {statement.line} below the definition."
+    for following in listing.code.list_following(statement):
+        if not following.indent and following.keyword == "def" and name[1] in following.bound_names:
+            return (
+                f"Line {following.line} defines {name[1]}, but is below. Move line {statement.line} below the "
+                "definition."
+            )
     return ""
 
 
@@ -111,32 +122,39 @@ def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | No
     """Return advice on a module or function whose name was assigned another value."""
     if listing is None or statement is None:
         return ""
-    lost = _NO_ATTRIBUTE.match(fault.message)
-    if lost:
-        owners = _collect_owners(lost[2], statement)
+    match = _NO_ATTRIBUTE.match(fault.message)
+    if match:
+        owners = _collect_owners(match[2], statement)
     elif _NOT_CALLABLE.match(fault.message):
         # The tokenizer returns an f-string as one token, so calls in it are searched by pattern.
         owners = _CALLED.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
     else:
         return ""
     for name in owners:
-        for other in _list_same_process(listing, clues):
-            for each in other.code.statements:
-                if each.target == name and _is_shared_name(name, listing, clues):
-                    at = f"Line {each.line}" if other is listing else f"Line {each.line} of {other.name}"
-                    return f"{at} gives {name} another value: {join_tokens(each.tokens)}. Choose another name there."
+        for other_listing in _list_same_process(listing, clues):
+            for assignment in other_listing.code.statements:
+                if assignment.target == name and _is_shared_name(name, listing, clues):
+                    location = (
+                        f"Line {assignment.line}"
+                        if other_listing is listing
+                        else f"Line {assignment.line} of {other_listing.name}"
+                    )
+                    return (
+                        f"{location} gives {name} another value: {join_tokens(assignment.tokens)}. Choose another "
+                        "name there."
+                    )
     return ""
 
 
 def _is_shared_name(name: str, listing: Listing, clues: Clues) -> bool:
     """Return whether a name is that of a module, a function or a robot object, not only of this variable."""
-    binds = (
+    binding_statements = (
         each
         for other in _list_same_process(listing, clues)
         for each in other.code.statements
         if each.keyword in ("import", "from", "def") and name in each.bound_names
     )
-    return name in _PREDEFINED_NAMES or any(binds)
+    return name in _PREDEFINED_NAMES or any(binding_statements)
 
 
 def _collect_owners(attribute: str, statement: Statement) -> list[str]:
@@ -151,9 +169,9 @@ def _collect_owners(attribute: str, statement: Statement) -> list[str]:
 def _collect_definitions(name: str, listings: Iterator[Listing] | list[Listing]) -> Iterator[tuple[Listing, Statement]]:
     """Yield the statements that bind a name outside functions."""
     for listing in listings:
-        for each in listing.code.statements:
-            if not each.indent and name in each.bound_names:
-                yield listing, each
+        for statement in listing.code.statements:
+            if not statement.indent and name in statement.bound_names:
+                yield listing, statement
 
 
 def _list_same_process(listing: Listing, clues: Clues) -> list[Listing]:

@@ -28,20 +28,20 @@ def hint_about_recognition(clues: Clues) -> Iterator[str]:
         accuracy = result.accuracy
         if accuracy is None or accuracy.value > _MAX_ACCURACY + 0.2 or not accuracy.n:
             continue
-        taken = {truth: answer for truth, answer, _ in accuracy.confusion if answer is not None}
-        if accuracy.value <= _MAX_ACCURACY and taken:
-            found = (
+        answers = {truth: answer for truth, answer, _ in accuracy.confusion if answer is not None}
+        if accuracy.value <= _MAX_ACCURACY and answers:
+            hint = (
                 _hint_about_other_sensor(clues)
-                or _hint_about_label_order(taken, clues)
-                or _hint_about_constant_answer(taken, accuracy, clues)
+                or _hint_about_label_order(answers, clues)
+                or _hint_about_constant_answer(answers, accuracy, clues)
             )
         else:
-            found = _hint_about_label_order(taken, clues)
-        found = (
-            found or _hint_about_unknown_label(result, accuracy, clues) or _hint_about_frequent_answer(accuracy, clues)
+            hint = _hint_about_label_order(answers, clues)
+        hint = (
+            hint or _hint_about_unknown_label(result, accuracy, clues) or _hint_about_frequent_answer(accuracy, clues)
         )
-        if found:
-            yield found
+        if hint:
+            yield hint
             return
 
 
@@ -57,37 +57,41 @@ def _hint_about_other_sensor(clues: Clues) -> str:
     return ""
 
 
-def _hint_about_label_order(taken: Mapping[str, str], clues: Clues) -> str:
+def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
     """Return a hint on class names in a different order than the network's: two swapped, or all shifted."""
-    swapped = [(truth, answer) for truth, answer in taken.items() if truth != answer and taken.get(answer) == truth]
-    wrong = [truth for truth, answer in taken.items() if truth != answer]
-    if not wrong or len(set(taken.values())) < len(taken):
+    swapped_pairs = [
+        (truth, answer) for truth, answer in answers.items() if truth != answer and answers.get(answer) == truth
+    ]
+    wrong_truths = [truth for truth, answer in answers.items() if truth != answer]
+    if not wrong_truths or len(set(answers.values())) < len(answers):
         return ""
-    where = _describe_labels_line(taken, clues)
-    if len(swapped) == len(wrong) == 2:
-        one, other = swapped[0]
+    location = _describe_labels_line(answers, clues)
+    if len(swapped_pairs) == len(wrong_truths) == 2:
+        first_name, second_name = swapped_pairs[0]
         order = "Put the names into the order of the network" if _has_prediction(clues) else "Exchange the two names"
-        return f"{where}: {quote_text(one)} and {quote_text(other)} are swapped. {order}"
-    if len(wrong) == len(taken) > 2:
+        return f"{location}: {quote_text(first_name)} and {quote_text(second_name)} are swapped. {order}"
+    if len(wrong_truths) == len(answers) > 2:
         return (
-            f"{where}: every image gets another's name, so the names are shifted by one place or in another order: "
-            f"{quote_text(wrong[0])} is called {quote_text(taken[wrong[0]])}. Put the names into the order of the "
+            f"{location}: every image gets another's name, so the names are shifted by one place or in another order: "
+            f"{quote_text(wrong_truths[0])} is called {quote_text(answers[wrong_truths[0]])}. Put the names into "
+            "the order of the "
             "network, and "
             "count from 0"
         )
-    if len(wrong) > 2:
+    if len(wrong_truths) > 2:
         return (
-            f"{where}: the names are in another order: {quote_text(wrong[0])} is called {quote_text(taken[wrong[0]])}. "
+            f"{location}: the names are in another order: {quote_text(wrong_truths[0])} is called "
+            f"{quote_text(answers[wrong_truths[0]])}. "
             "Put the names into the order of the network"
         )
     return ""
 
 
-def _describe_labels_line(taken: Mapping[str, str], clues: Clues) -> str:
+def _describe_labels_line(answers: Mapping[str, str], clues: Clues) -> str:
     """Return the first line with one of the names in quotes."""
     for listing in clues.responders:
         for number, line in enumerate(listing.lines, 1):
-            if any(f'"{name}"' in line or f"'{name}'" in line for name in taken):
+            if any(f'"{name}"' in line or f"'{name}'" in line for name in answers):
                 return listing.locate(number)
     return _describe_prediction_line(clues)
 
@@ -102,32 +106,41 @@ def _has_prediction(clues: Clues) -> bool:
 
 def _hint_about_frequent_answer(accuracy: Accuracy, clues: Clues) -> str:
     """Return a hint on a name that most wrong answers have: the line that gives it, or the line that trains."""
-    wrong: Counter[str] = Counter()
+    wrong_counts: Counter[str] = Counter()
     for truth, answer, count in accuracy.confusion:
         if answer is not None and answer != truth:
-            wrong[answer] += count
-    if not wrong or accuracy.value > _MAX_ACCURACY:
+            wrong_counts[answer] += count
+    if not wrong_counts or accuracy.value > _MAX_ACCURACY:
         return ""
-    name, count = wrong.most_common(1)[0]
-    is_favourite = 2 * count > wrong.total()
+    name, count = wrong_counts.most_common(1)[0]
+    is_favourite = 2 * count > wrong_counts.total()
     for listing in clues.responders:
-        for each in listing.code.statements:
-            if is_favourite and each.keyword == "return" and any(token[1:-1] == name for token in each.tokens):
-                head = next((one for one in listing.code.list_enclosing(each) if one.keyword in ("if", "elif")), None)
-                check = (
+        for statement in listing.code.statements:
+            if (
+                is_favourite
+                and statement.keyword == "return"
+                and any(token[1:-1] == name for token in statement.tokens)
+            ):
+                head = next(
+                    (one for one in listing.code.list_enclosing(statement) if one.keyword in ("if", "elif")), None
+                )
+                checked_part = (
                     f"the condition in line {head.line}, {join_tokens(head.condition)}"
                     if head
                     else "the rules above it"
                 )
                 return (
-                    f"{listing.locate(each.line)}: most images are called {quote_text(name)}. Check {check}, and "
+                    f"{listing.locate(statement.line)}: most images are called {quote_text(name)}. Check "
+                    f"{checked_part}, and "
                     "the pixels "
                     "that it gets: black is near 0, white near 255"
                 )
-        fit = next((each for each in listing.code.statements if any(_is_fit_call(call) for call in each.calls)), None)
-        if fit is not None:
+        fit_statement = next(
+            (each for each in listing.code.statements if any(_is_fit_call(call) for call in each.calls)), None
+        )
+        if fit_statement is not None:
             return (
-                f"{listing.locate(fit.line)} trains a classifier that names most images wrongly, often as "
+                f"{listing.locate(fit_statement.line)} trains a classifier that names most images wrongly, often as "
                 f"{quote_text(name)}. "
                 "Train longer (max_iter=300), and give each image the label that belongs to it"
             )
@@ -138,15 +151,15 @@ def _is_fit_call(call: CallInCode) -> bool:
     return call.name.rpartition(".")[2] in ("fit", "partial_fit")
 
 
-def _hint_about_constant_answer(taken: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> str:
+def _hint_about_constant_answer(answers: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> str:
     """Return a hint if all images get the same name."""
-    if len(set(taken.values())) > 1 or len(taken) < 3 or not _has_prediction(clues):
+    if len(set(answers.values())) > 1 or len(answers) < 3 or not _has_prediction(clues):
         return ""
-    answer = next(iter(taken.values()))
-    normalises = any(each.find_line(_DIVISION) for each in clues.responders)
+    answer = next(iter(answers.values()))
+    is_normalised = any(each.find_line(_DIVISION) for each in clues.responders)
     fix = (
         "Print what you give to predict: it must be different for different images"
-        if normalises
+        if is_normalised
         else "The network is for numbers from 0 to 1: divide the image by its largest value"
     )
     return f"{_describe_prediction_line(clues)}: every image is called {quote_text(answer)}, whatever it shows. {fix}"
@@ -154,8 +167,8 @@ def _hint_about_constant_answer(taken: Mapping[str, str], accuracy: Accuracy, cl
 
 def _hint_about_unknown_label(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:
     """Return a hint on an answer that is not a valid name."""
-    found = next((_NO_LABEL.search(each.message) for each in result.evidence if not each.passed), None)
-    if found is None or not accuracy.labels:
+    match = next((_NO_LABEL.search(each.message) for each in result.evidence if not each.passed), None)
+    if match is None or not accuracy.labels:
         return ""
     names = ", ".join(quote_text(label) for label in accuracy.labels[:3])
-    return f"{_describe_prediction_line(clues)}: the answer is {found[1]}; expected one of the names, as {names}"
+    return f"{_describe_prediction_line(clues)}: the answer is {match[1]}; expected one of the names, as {names}"

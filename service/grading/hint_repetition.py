@@ -31,18 +31,18 @@ def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
     for criterion in clues.lost:
         if not isinstance(criterion, WordSequence):
             continue
-        for listing, each in collect_statements(clues):
-            call = next((one for one in each.calls if one.name in _OUTPUT_FUNCTIONS), None)
-            loop = listing.code.statements[each.parent] if each.parent >= 0 else None
+        for listing, statement in collect_statements(clues):
+            call = next((one for one in statement.calls if one.name in _OUTPUT_FUNCTIONS), None)
+            loop = listing.code.statements[statement.parent] if statement.parent >= 0 else None
             if call is None or loop is None or loop.keyword not in LOOPS or not call.arguments:
                 continue
             text = call.arguments[0][0][1:-1] if call.arguments[0][0][:1] in ("'", '"') else ""
-            once = sum(text.casefold() in map(str.casefold, texts) for texts in criterion.words) == 1
+            is_single = sum(text.casefold() in map(str.casefold, texts) for texts in criterion.words) == 1
             lines = clues.recordings[0].spoken if call.name == "say" else clues.recordings[0].printed
             count = sum(line.text == text for line in lines)
-            if once and count > 1 and len(call.arguments[0]) == 1:
+            if is_single and count > 1 and len(call.arguments[0]) == 1:
                 yield (
-                    f"{listing.locate(each.line)} {call.name}s {quote_text(text)} {count} times, in each pass of "
+                    f"{listing.locate(statement.line)} {call.name}s {quote_text(text)} {count} times, in each pass of "
                     "the loop in "
                     f"line {loop.line}; expected once. To run it after the loop, remove its indentation"
                 )
@@ -51,20 +51,23 @@ def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
 
 def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that repeats its output because it is nested in an unrelated loop."""
-    again = next((found for each in clues.results if (found := _REPEATED_WORDS.search(each.message))), None)
-    if again is None:
+    match = next((found for each in clues.results if (found := _REPEATED_WORDS.search(each.message))), None)
+    if match is None:
         return
-    for listing, each in collect_statements(clues):
-        outer = listing.code.statements[each.parent] if each.parent >= 0 else None
-        if each.keyword != "for" or outer is None or outer.keyword != "for":
+    for listing, statement in collect_statements(clues):
+        outer_loop = listing.code.statements[statement.parent] if statement.parent >= 0 else None
+        if statement.keyword != "for" or outer_loop is None or outer_loop.keyword != "for":
             continue
-        body = listing.code.list_body(each)
-        speaks = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
-        if speaks and not any(one.has_token(*outer.bound_names - each.bound_names) for one in (each, *body)):
+        body = listing.code.list_body(statement)
+        has_output = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
+        if has_output and not any(
+            one.has_token(*outer_loop.bound_names - statement.bound_names) for one in (statement, *body)
+        ):
             yield (
-                f"{listing.locate(each.line)}: this loop is inside the loop in line {outer.line}, so it repeats "
+                f"{listing.locate(statement.line)}: this loop is inside the loop in line {outer_loop.line}, so it "
+                "repeats "
                 "its words "
-                f"in each pass of that loop. Words that are expected once appeared {again[1]} more times. To run this "
+                f"in each pass of that loop. Words that are expected once appeared {match[1]} more times. To run this "
                 "loop once, after the other loop, indent it less"
             )
             return
@@ -74,28 +77,44 @@ def hint_about_last_number(clues: Clues) -> Iterator[str]:
     """Yield a hint on a count that ends one too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
     for criterion in clues.lost:
         result = next((each for each in clues.results if each.id == criterion.id), None)
-        found = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
-        if found is None or not isinstance(criterion, WordSequence):
+        match = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
+        if match is None or not isinstance(criterion, WordSequence):
             continue
-        before, missing = int(found[1]), int(found[2])
-        for listing, each in collect_statements(clues):
-            signed = each.condition if each.keyword == "while" else ()
-            if len(signed) == 3 and signed[1] in _INCLUSIVE and listing.code.number(signed[2:]) == missing:
-                better = f"{signed[0]} {_INCLUSIVE[signed[1]]} {signed[2]}"
-                yield f"{listing.locate(each.line)}: the loop ends before {missing}. Write while {better}"
+        last_number, missing_number = int(match[1]), int(match[2])
+        for listing, statement in collect_statements(clues):
+            condition = statement.condition if statement.keyword == "while" else ()
+            if (
+                len(condition) == 3
+                and condition[1] in _INCLUSIVE
+                and listing.code.number(condition[2:]) == missing_number
+            ):
+                fixed_condition = f"{condition[0]} {_INCLUSIVE[condition[1]]} {condition[2]}"
+                yield (
+                    f"{listing.locate(statement.line)}: the loop ends before {missing_number}. Write while "
+                    f"{fixed_condition}"
+                )
                 return
-            call = next((one for one in each.calls if one.name == "range"), None) if each.keyword == "for" else None
+            call = (
+                next((one for one in statement.calls if one.name == "range"), None)
+                if statement.keyword == "for"
+                else None
+            )
             if call is None or not 1 <= len(call.arguments) <= 3:
                 continue
             end = call.arguments[0] if len(call.arguments) == 1 else call.arguments[1]
-            if listing.code.number(end) != missing:
+            if listing.code.number(end) != missing_number:
                 continue
-            first = ("1",) if len(call.arguments) == 1 and criterion.words[0][0] == "1" else call.arguments[0]
-            start = ("0",) if len(call.arguments) == 1 and criterion.words[0][0] == "0" else first
-            fixed = (start, (str(missing + (1 if missing > before else -1)),), *call.arguments[2:])
+            first_argument = ("1",) if len(call.arguments) == 1 and criterion.words[0][0] == "1" else call.arguments[0]
+            start = ("0",) if len(call.arguments) == 1 and criterion.words[0][0] == "0" else first_argument
+            fixed_arguments = (
+                start,
+                (str(missing_number + (1 if missing_number > last_number else -1)),),
+                *call.arguments[2:],
+            )
             yield (
-                f"{listing.locate(each.line)}: range({format_arguments(call.arguments)}) ends before {missing}. "
-                f"Write range({format_arguments(fixed)})"
+                f"{listing.locate(statement.line)}: range({format_arguments(call.arguments)}) ends before "
+                f"{missing_number}. "
+                f"Write range({format_arguments(fixed_arguments)})"
             )
             return
 
@@ -104,14 +123,20 @@ def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that logs only while a reading equals one exact number."""
     if not any(isinstance(each, Datalog) for each in clues.lost) or not _has_ended_normally(clues):
         return
-    for listing, each in collect_statements(clues):
-        signed = each.condition if each.keyword == "while" else ()
-        body = listing.code.list_body(each)
-        prints = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
-        reads = any(signed and (token in PROPERTIES) for one in (each, *body) for token in one.tokens)
-        if "==" in signed and prints and reads and listing.code.number(signed[signed.index("==") + 1 :]) is not None:
+    for listing, statement in collect_statements(clues):
+        condition = statement.condition if statement.keyword == "while" else ()
+        body = listing.code.list_body(statement)
+        has_output = any(call.name in _OUTPUT_FUNCTIONS for one in body for call in one.calls)
+        has_reading = any(condition and (token in PROPERTIES) for one in (statement, *body) for token in one.tokens)
+        if (
+            "==" in condition
+            and has_output
+            and has_reading
+            and listing.code.number(condition[condition.index("==") + 1 :]) is not None
+        ):
             yield (
-                f"{listing.locate(each.line)}: the loop goes on only while {join_tokens(signed)} is true, so it "
+                f"{listing.locate(statement.line)}: the loop goes on only while {join_tokens(condition)} is true, "
+                "so it "
                 "ends at the "
                 f"first other reading: the program ended after {clues.seconds:.1f} s. Write a condition that is true "
                 "until the last reading that is asked for"
@@ -121,30 +146,36 @@ def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
 
 def hint_about_single_reaction(clues: Clues) -> Iterator[str]:
     """Yield a hint on a program that reacts to a sensor once, if the robot has to do so repeatedly."""
-    several = any(isinstance(each, Encounters) and each.at_least > 1 for each in clues.lost)
-    if not several or not _has_ended_normally(clues) or clues.seconds > clues.limit / 2:
+    is_repeated = any(isinstance(each, Encounters) and each.at_least > 1 for each in clues.lost)
+    if not is_repeated or not _has_ended_normally(clues) or clues.seconds > clues.limit / 2:
         return
-    for listing, each in collect_statements(clues):
-        waits = each.keyword == "while" and each.parent < 0 and any(token in PROPERTIES for token in each.condition)
-        if not waits:
+    for listing, statement in collect_statements(clues):
+        is_wait = (
+            statement.keyword == "while"
+            and statement.parent < 0
+            and any(token in PROPERTIES for token in statement.condition)
+        )
+        if not is_wait:
             continue
-        reacts = [
-            one for one in listing.code.list_following(each) if one.parent < 0 and has_motor_call(one, LIMITED_MOVES)
+        reactions = [
+            one
+            for one in listing.code.list_following(statement)
+            if one.parent < 0 and has_motor_call(one, LIMITED_MOVES)
         ]
-        if reacts:
+        if reactions:
             yield (
-                f"{listing.locate(_find_first_move(listing.code.statements, each).line)}: the program does "
+                f"{listing.locate(_find_first_move(listing.code.statements, statement).line)}: the program does "
                 "everything once, and "
                 f"ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write while True: above this "
-                f"line, and indent the lines from here to line {reacts[-1].last_line}"
+                f"line, and indent the lines from here to line {reactions[-1].last_line}"
             )
             return
 
 
 def _find_first_move(statements: tuple[Statement, ...], loop: Statement) -> Statement:
     """Return the first statement above a loop that switches a motor on; the loop if there is none."""
-    above = [each for each in statements[: loop.number] if has_motor_call(each, frozenset({"on"}))]
-    return above[0] if above else loop
+    starts = [each for each in statements[: loop.number] if has_motor_call(each, frozenset({"on"}))]
+    return starts[0] if starts else loop
 
 
 def _has_ended_normally(clues: Clues) -> bool:

@@ -36,13 +36,16 @@ _PY = re.compile(r"""["']PY::""")
 def hint_about_misnamed_function(clues: Clues) -> Iterator[str]:
     """Yield a hint on a required function that exists under a similar name."""
     names = (_NO_FUNCTION.search(fault.message) for fault in clues.faults)
-    asked = next((name[1] for name in names if name), None)
-    if asked is None:
+    required_name = next((name[1] for name in names if name), None)
+    if required_name is None:
         return
-    found = [(one, each) for one in clues.responders for each in one.code.list_functions() if not each.indent]
-    near = difflib.get_close_matches(asked, [each.tokens[1] for _, each in found], 1, 0.5)
-    for listing, each in [pair for pair in found if pair[1].tokens[1] in near][:1]:
-        yield f"{listing.locate(each.line)} defines {sanitise_name(each.tokens[1])}; expected a function called {asked}"
+    functions = [(one, each) for one in clues.responders for each in one.code.list_functions() if not each.indent]
+    similar_names = difflib.get_close_matches(required_name, [each.tokens[1] for _, each in functions], 1, 0.5)
+    for listing, head in [pair for pair in functions if pair[1].tokens[1] in similar_names][:1]:
+        yield (
+            f"{listing.locate(head.line)} defines {sanitise_name(head.tokens[1])}; expected a function called "
+            f"{required_name}"
+        )
 
 
 def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
@@ -56,62 +59,67 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
         )
         return
     for listing in clues.programs:
-        for each in listing.code.list_functions():
-            if _RESPONDER.match(each.tokens[1]) and listing.part is None:
+        for head in listing.code.list_functions():
+            if _RESPONDER.match(head.tokens[1]) and listing.part is None:
                 yield (
-                    f"{listing.locate(each.line)} defines {each.tokens[1]} in the robot program, where nothing "
+                    f"{listing.locate(head.line)} defines {head.tokens[1]} in the robot program, where nothing "
                     "calls it. "
-                    f"Move it to a cell above, and add roboSim.pyresponder = {each.tokens[1]} below it"
+                    f"Move it to a cell above, and add roboSim.pyresponder = {head.tokens[1]} below it"
                 )
                 return
-    found = [
+    functions = [
         (listing, each) for listing in clues.responders for each in listing.code.list_functions() if not each.indent
     ]
-    near = [pair for pair in found if _measure_similarity(pair[1].tokens[1].lower(), "responder") >= _MIN_SIMILARITY]
-    for listing, each in (*near, *found[-1:]):
-        name, is_cell = each.tokens[1], listing.part is None
+    similar_functions = [
+        pair for pair in functions if _measure_similarity(pair[1].tokens[1].lower(), "responder") >= _MIN_SIMILARITY
+    ]
+    for listing, head in (*similar_functions, *functions[-1:]):
+        name, is_cell = head.tokens[1], listing.part is None
         if is_cell and _RESPONDER.match(name):
             return
-        if near:
-            yield f"{listing.locate(each.line)} defines {sanitise_name(name)}; expected a function called responder"
+        if similar_functions:
+            yield f"{listing.locate(head.line)} defines {sanitise_name(name)}; expected a function called responder"
         elif is_cell:
             yield (
-                f"{listing.locate(each.line)} defines {sanitise_name(name)}, but nothing makes it the responder. "
+                f"{listing.locate(head.line)} defines {sanitise_name(name)}, but nothing makes it the responder. "
                 f"Add the line roboSim.pyresponder = {name} below it"
             )
         else:
             yield (
-                f"{listing.locate(each.line)} defines {sanitise_name(name)}, but there is no function called "
+                f"{listing.locate(head.line)} defines {sanitise_name(name)}, but there is no function called "
                 "responder. "
                 "Begin the function that answers the robot with def responder(text):"
             )
         return
-    where = next((each.name for each in clues.responders if each.part is not None), "no cell")
-    says = "defines no responder" if where != "no cell" else "defines a responder"
-    yield f'{where} {says}. Add a function that begins with "def responder(text):"'
+    location = next((each.name for each in clues.responders if each.part is not None), "no cell")
+    clause = "defines no responder" if location != "no cell" else "defines a responder"
+    yield f'{location} {clause}. Add a function that begins with "def responder(text):"'
 
 
 def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
     """Yield a hint on a responder that does not take exactly one argument, or is not a function."""
     for fault in clues.faults:
-        bad = _BAD_CALL.match(fault.message)
-        if fault.who != "responder" or not (bad or _NOT_CALLABLE in fault.message):
+        call_match = _BAD_CALL.match(fault.message)
+        if fault.who != "responder" or not (call_match or _NOT_CALLABLE in fault.message):
             continue
         for listing in clues.responders:
-            for each in listing.code.statements:
-                is_function = bad is not None and fault.line is None and each.tokens[:2] == ("def", bad[1])
-                if is_function and ":" in each.tokens:
-                    count = _describe_parameters(each)
+            for statement in listing.code.statements:
+                is_function = (
+                    call_match is not None and fault.line is None and statement.tokens[:2] == ("def", call_match[1])
+                )
+                if is_function and ":" in statement.tokens:
+                    count = _describe_parameters(statement)
                     yield (
-                        f"{listing.locate(each.line)}: {join_tokens(each.tokens)[4:-1]} asks for {count}, but it "
+                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} asks for "
+                        f"{count}, but it "
                         "is called with "
-                        f"one text. Write def {each.tokens[1]}(text):"
+                        f"one text. Write def {statement.tokens[1]}(text):"
                     )
                     return
-                if not bad and each.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
-                    name = each.tokens[4]
+                if not call_match and statement.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
+                    name = statement.tokens[4]
                     yield (
-                        f"{listing.locate(each.line)} assigns a text to roboSim.pyresponder; expected a function. "
+                        f"{listing.locate(statement.line)} assigns a text to roboSim.pyresponder; expected a function. "
                         f"Write it without brackets: roboSim.pyresponder = {name}"
                     )
                     return
@@ -127,12 +135,12 @@ def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
                 continue
             body = listing.code.list_body(head)
             returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
-            prints = [each for each in body if each.keyword == "print"]
-            if prints and (not returns or prints[-1].line > returns[-1].line):
-                line = prints[-1].line
-                said = quote_text(listing.lines[line - 1])
+            print_statements = [each for each in body if each.keyword == "print"]
+            if print_statements and (not returns or print_statements[-1].line > returns[-1].line):
+                line = print_statements[-1].line
+                code_line = quote_text(listing.lines[line - 1])
                 yield (
-                    f"{listing.locate(line)}, {said}, prints the answer, but no line returns it. Return the "
+                    f"{listing.locate(line)}, {code_line}, prints the answer, but no line returns it. Return the "
                     "answer with "
                     "return"
                 )
@@ -161,11 +169,13 @@ def hint_about_unreadable_answers(clues: Clues) -> Iterator[str]:
             ]
             if not _RESPONDER.match(head.tokens[1]) or not returns:
                 continue
-            plain = [each for each in returns if not any(_is_dump_function(call.name) for call in each.calls)]
-            texts = [each for each in returns if each.has_token("str")]
-            each = (texts or plain or returns)[-1]
-            fix = "Write json.dumps(...) in place of str(...)" if texts else fault.hint
-            yield f"{listing.locate(each.line)}: {fault.message.rstrip('.')}. {fix}"
+            undumped_returns = [
+                each for each in returns if not any(_is_dump_function(call.name) for call in each.calls)
+            ]
+            str_returns = [each for each in returns if each.has_token("str")]
+            return_statement = (str_returns or undumped_returns or returns)[-1]
+            fix = "Write json.dumps(...) in place of str(...)" if str_returns else fault.hint
+            yield f"{listing.locate(return_statement.line)}: {fault.message.rstrip('.')}. {fix}"
             return
 
 
@@ -174,11 +184,16 @@ def hint_about_double_json(clues: Clues) -> Iterator[str]:
     if not any(_DOUBLE_JSON.match(text) for text in clues.answers):
         return
     for listing in clues.responders:
-        dumps = [each for each in listing.code.statements if any(_is_dump_function(call.name) for call in each.calls)]
-        twice = [each for each in dumps if sum(_is_dump_function(call.name) for call in each.calls) > 1]
-        for each in (*twice, *dumps[-1:]):
+        dump_statements = [
+            each for each in listing.code.statements if any(_is_dump_function(call.name) for call in each.calls)
+        ]
+        double_dumps = [
+            each for each in dump_statements if sum(_is_dump_function(call.name) for call in each.calls) > 1
+        ]
+        for statement in (*double_dumps, *dump_statements[-1:]):
             yield (
-                f"{listing.locate(each.line)}: the object is made JSON twice, so the robot gets a text and no object. "
+                f"{listing.locate(statement.line)}: the object is made JSON twice, so the robot gets a text and "
+                "no object. "
                 "Call json.dumps once"
             )
             return
@@ -192,33 +207,42 @@ def hint_about_single_colon(clues: Clues) -> Iterator[str]:
     ):
         return
     for listing in clues.responder_process_listings:
-        for each in listing.code.statements:
-            for call in each.calls:
+        for statement in listing.code.statements:
+            for call in statement.calls:
                 method = call.name.rpartition(".")[2]
                 if method in ("partition", "split") and call.arguments and call.arguments[0] in _COLON:
-                    cut = 'partition("::")' if method == "partition" else 'split("::", 1)'
+                    split_call = 'partition("::")' if method == "partition" else 'split("::", 1)'
                     yield (
-                        f'{listing.locate(each.line)} cuts the message at ":", so the rest still begins with a colon. '
-                        f"The prefix ends in two colons: write {cut}"
+                        f'{listing.locate(statement.line)} cuts the message at ":", so the rest still begins with '
+                        "a colon. "
+                        f"The prefix ends in two colons: write {split_call}"
                     )
                     return
 
 
 def hint_about_unqueued_answers(clues: Clues) -> Iterator[str]:
     """Yield a hint on an empty queue if no answer begins with JSON::, with the line that answers."""
-    empty = any(_EMPTY.match(fault.message) and fault.who == "program" for fault in clues.faults)
-    if not empty or not clues.should_use_queue or not clues.answers or any(JSON in text for text in clues.answers):
+    is_queue_empty = any(_EMPTY.match(fault.message) and fault.who == "program" for fault in clues.faults)
+    if (
+        not is_queue_empty
+        or not clues.should_use_queue
+        or not clues.answers
+        or any(JSON in text for text in clues.answers)
+    ):
         return
     if any(True for _ in (*hint_about_answers(clues), *hint_about_wrong_prefix(clues))):
         return
     answer = quote_text(clues.answers[0])
-    again = next((each for each in hint_about_redefined_functions(clues) if "responder again" in each), "")
-    if again:
-        yield f"{again.partition('. ')[0]}. It answers {answer}, without {JSON}, so the queue stays empty. Delete it"
+    redefinition_hint = next((each for each in hint_about_redefined_functions(clues) if "responder again" in each), "")
+    if redefinition_hint:
+        yield (
+            f"{redefinition_hint.partition('. ')[0]}. It answers {answer}, without {JSON}, so the queue stays empty. "
+            "Delete it"
+        )
         return
-    where = describe_return_line(clues.answers[0], clues, _RETURN)
+    location = describe_return_line(clues.answers[0], clues, _RETURN)
     yield (
-        f"{where} answers {answer}, without {JSON} at its start, so the queue stays empty. "
+        f"{location} answers {answer}, without {JSON} at its start, so the queue stays empty. "
         f'Write return "{JSON}" + json.dumps(...)'
     )
 
@@ -227,8 +251,10 @@ def hint_about_wrong_prefix(clues: Clues) -> Iterator[str]:
     """Yield a hint on an answer with the prefix PY::, which is for messages from the robot."""
     for text in clues.answers:
         if text.startswith("PY::") and clues.should_use_queue:
-            where = clues.describe_matching_line("responder", re.compile(r"""["']PY::"""))
-            yield f'{where}: the answer is {quote_text(text)}, which begins with PY::; expected "{JSON}" at its start'
+            location = clues.describe_matching_line("responder", re.compile(r"""["']PY::"""))
+            yield (
+                f'{location}: the answer is {quote_text(text)}, which begins with PY::; expected "{JSON}" at its start'
+            )
             return
 
 
@@ -241,5 +267,5 @@ def _describe_parameters(head: Statement) -> str:
     return {0: "nothing", 2: "two values", 3: "three values"}.get(count, f"{count} values")
 
 
-def _measure_similarity(one: str, other: str) -> float:
-    return difflib.SequenceMatcher(None, one, other).ratio()
+def _measure_similarity(first_name: str, second_name: str) -> float:
+    return difflib.SequenceMatcher(None, first_name, second_name).ratio()

@@ -17,16 +17,17 @@ _CALLED = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(
 def hint_about_signatures(clues: Clues) -> Iterator[str]:
     """Yield a hint on the definition that does not match a call."""
     for fault in clues.faults:
-        found = _CALLED.match(fault.message)
-        listing, head = _find_definition(found[2], clues) if found else (None, None)
-        if found is None or listing is None or head is None:
+        match = _CALLED.match(fault.message)
+        listing, head = _find_definition(match[2], clues) if match else (None, None)
+        if match is None or listing is None or head is None:
             continue
-        name = found[2]
-        inside = next((each for each in listing.code.list_enclosing(head) if each.keyword == "class"), None)
-        if inside is not None and "self" not in head.tokens:
-            rest = "".join(f", {each}" for each in _list_parameters(head))
+        name = match[2]
+        enclosing_class = next((each for each in listing.code.list_enclosing(head) if each.keyword == "class"), None)
+        if enclosing_class is not None and "self" not in head.tokens:
+            parameters = "".join(f", {each}" for each in _list_parameters(head))
             yield (
-                f'{listing.locate(head.line)}: a method needs self as first parameter. Write "def {name}(self{rest}):"'
+                f'{listing.locate(head.line)}: a method needs self as first parameter. Write "def '
+                f'{name}(self{parameters}):"'
             )
             return
         arguments = _list_arguments(name, clues)
@@ -37,10 +38,11 @@ def hint_about_signatures(clues: Clues) -> Iterator[str]:
                 f'{len(arguments)}. Write "def {name}({", ".join(arguments)}):"'
             )
             return
-        where = describe_fault_line(fault, clues)
-        if where and fault.line is not None and inside is None:
+        location = describe_fault_line(fault, clues)
+        if location and fault.line is not None and enclosing_class is None:
             yield (
-                f"{where} calls {name} with another number of values than line {head.line} of {listing.name} defines. "
+                f"{location} calls {name} with another number of values than line {head.line} of {listing.name} "
+                "defines. "
                 f"Its parameters are: {', '.join(_list_parameters(head)) or 'none'}"
             )
             return
@@ -65,11 +67,11 @@ def _list_parameters(head: Statement) -> list[str]:
 def _list_arguments(name: str, clues: Clues) -> list[str]:
     """Return the argument names in a call of the function, with a placeholder for each that is not a name."""
     for listing in clues.responder_process_listings:
-        for each in listing.code.statements:
-            for call in each.calls:
+        for statement in listing.code.statements:
+            for call in statement.calls:
                 if call.name == name:
-                    plain = [one[0] if len(one) == 1 and is_name(one[0]) else "" for one in call.arguments]
-                    return [text or f"value{number}" for number, text in enumerate(plain, 1)]
+                    names = [one[0] if len(one) == 1 and is_name(one[0]) else "" for one in call.arguments]
+                    return [text or f"value{number}" for number, text in enumerate(names, 1)]
     return []
 
 

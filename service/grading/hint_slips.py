@@ -48,42 +48,46 @@ def hint_about_missing_comma(clues: Clues) -> Iterator[str]:
         return
     for listing in clues.texts:
         for statement in listing.code.statements:
-            found = _check_missing_comma(listing, statement)
-            if found:
-                yield found
+            sentence = _check_missing_comma(listing, statement)
+            if sentence:
+                yield sentence
                 return
 
 
 def collect_slips(listing: Listing) -> Iterator[str]:
     """Yield all slips in a text."""
     for statement in listing.code.statements:
-        for slip in _SLIP_CHECKS:
-            found = slip(listing, statement)
-            if found:
-                yield found
+        for check in _SLIP_CHECKS:
+            sentence = check(listing, statement)
+            if sentence:
+                yield sentence
 
 
 def _check_caret(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
-    for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
-        if token == "^" and _NUMBER.match(after) and (is_name(before) or before == ")" or _NUMBER.match(before)):
+    for previous, token, following in zip(tokens, tokens[1:], tokens[2:], strict=False):
+        if (
+            token == "^"
+            and _NUMBER.match(following)
+            and (is_name(previous) or previous == ")" or _NUMBER.match(previous))
+        ):
             return f"{listing.locate(statement.line)}: ^ is not a power in Python. Write ** in place of ^"
     return ""
 
 
 def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
-    tokens, words = statement.tokens, {"&": "and", "|": "or"}
+    tokens, keywords = statement.tokens, {"&": "and", "|": "or"}
     levels = compute_bracket_depths(tokens)
-    for place, token in enumerate(tokens):
-        if token not in words:
+    for index, token in enumerate(tokens):
+        if token not in keywords:
             continue
-        left, right = _split_operands(tokens, levels, place)
-        compared = [each for each in (*left, *right) if each in COMPARISONS]
-        if len(compared) > 1:
+        left, right = _split_operands(tokens, levels, index)
+        comparisons = [each for each in (*left, *right) if each in COMPARISONS]
+        if len(comparisons) > 1:
             return (
-                f"{listing.locate(statement.line)}: {token} is calculated before {compared[0]}, so this does not "
+                f"{listing.locate(statement.line)}: {token} is calculated before {comparisons[0]}, so this does not "
                 "ask for "
-                f"both comparisons. Write {words[token]} in place of {token}"
+                f"both comparisons. Write {keywords[token]} in place of {token}"
             )
     return ""
 
@@ -91,19 +95,19 @@ def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
 def _check_constant_operand(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``day == "Saturday" or "Sunday"``, where the second operand is not a comparison."""
     tokens = statement.tokens
-    for place, token in enumerate(tokens[:-1]):
-        value, after = tokens[place + 1], tokens[place + 2 : place + 3]
-        literal = (_TEXT.match(value) and len(value) > 2) or (_NUMBER.match(value) and float(value))
-        if token not in ("or", "and") or not literal or (after and after[0] not in _AFTER_OPERAND):
+    for index, token in enumerate(tokens[:-1]):
+        value, following = tokens[index + 1], tokens[index + 2 : index + 3]
+        is_literal = (_TEXT.match(value) and len(value) > 2) or (_NUMBER.match(value) and float(value))
+        if token not in ("or", "and") or not is_literal or (following and following[0] not in _AFTER_OPERAND):
             continue
-        begin = next((at + 1 for at in range(place - 1, -1, -1) if tokens[at] in _BEFORE_OPERAND), 0)
-        left = tokens[begin:place]
-        sign = next((at for at, each in enumerate(left) if each in COMPARISONS), None)
-        if sign:
-            whole = join_tokens((*left[: sign + 1], value))
+        start = next((at + 1 for at in range(index - 1, -1, -1) if tokens[at] in _BEFORE_OPERAND), 0)
+        left_operand = tokens[start:index]
+        sign_index = next((at for at, each in enumerate(left_operand) if each in COMPARISONS), None)
+        if sign_index:
+            comparison = join_tokens((*left_operand[: sign_index + 1], value))
             return (
                 f"{listing.locate(statement.line)}: {value} after {token} is not compared, and is always true. "
-                f"Write {token} {whole}"
+                f"Write {token} {comparison}"
             )
     return ""
 
@@ -111,16 +115,27 @@ def _check_constant_operand(listing: Listing, statement: Statement) -> str:
 def _check_bare_operand(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``left and right < 25``, where the first operand is not a comparison."""
     tokens = statement.tokens
-    for place in range(1, len(tokens) - 4):
-        before, name, word, other, sign = tokens[place - 1 : place + 4]
-        if word not in ("and", "or") or before not in _BEFORE_OPERAND or before == "=" or sign not in _ORDER_SIGNS:
+    for index in range(1, len(tokens) - 4):
+        previous, first_name, connective, second_name, sign = tokens[index - 1 : index + 4]
+        if (
+            connective not in ("and", "or")
+            or previous not in _BEFORE_OPERAND
+            or previous == "="
+            or sign not in _ORDER_SIGNS
+        ):
             continue
-        if is_name(name) and is_name(other) and name != other and _is_numeric_name(listing.code, name):
-            number = tokens[place + 4]
+        if (
+            is_name(first_name)
+            and is_name(second_name)
+            and first_name != second_name
+            and _is_numeric_name(listing.code, first_name)
+        ):
+            number = tokens[index + 4]
             return (
-                f"{listing.locate(statement.line)}: {name} {word} {other} {sign} {number} only asks whether "
-                f"{name} is not "
-                f"0. Write {name} {sign} {number} {word} {other} {sign} {number}"
+                f"{listing.locate(statement.line)}: {first_name} {connective} {second_name} {sign} {number} only "
+                "asks whether "
+                f"{first_name} is not "
+                f"0. Write {first_name} {sign} {number} {connective} {second_name} {sign} {number}"
             )
     return ""
 
@@ -140,41 +155,46 @@ def _is_numeric_name(code: CodeStatements, name: str) -> bool:
 def _check_missing_comma(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
     levels = compute_bracket_depths(tokens)
-    for place in range(1, len(tokens) - 1):
-        one, other = tokens[place : place + 2]
-        texts = _TEXT.match(one) and _TEXT.match(other) and max(len(one), len(other)) <= _LONGEST_ENTRY
-        if not texts or levels[place] == 0:
+    for index in range(1, len(tokens) - 1):
+        first_text, second_text = tokens[index : index + 2]
+        is_text_pair = (
+            _TEXT.match(first_text)
+            and _TEXT.match(second_text)
+            and max(len(first_text), len(second_text)) <= _LONGEST_ENTRY
+        )
+        if not is_text_pair or levels[index] == 0:
             continue
-        opening = next(at for at in range(place, -1, -1) if levels[at] < levels[place] or at == 0)
-        inside = [at for at in range(opening + 1, len(tokens)) if levels[at] == levels[place]]
-        if tokens[opening] in "[{" and any(tokens[at] == "," for at in inside):
-            line = _find_line(listing, statement, one, other)
+        opening_index = next(at for at in range(index, -1, -1) if levels[at] < levels[index] or at == 0)
+        inner_indices = [at for at in range(opening_index + 1, len(tokens)) if levels[at] == levels[index]]
+        if tokens[opening_index] in "[{" and any(tokens[at] == "," for at in inner_indices):
+            line = _find_line(listing, statement, first_text, second_text)
             return (
-                f"{listing.locate(line)}: a comma is missing after {one}, so Python joins it to {other}. Add the comma"
+                f"{listing.locate(line)}: a comma is missing after {first_text}, so Python joins it to {second_text}. "
+                "Add the comma"
             )
     return ""
 
 
-def _find_line(listing: Listing, statement: Statement, one: str, other: str) -> int:
+def _find_line(listing: Listing, statement: Statement, first_text: str, second_text: str) -> int:
     """Return the line of the first of two adjacent texts."""
     for number in range(statement.line, min(statement.last_line, len(listing.lines)) + 1):
         text = listing.lines[number - 1]
-        if one in text and (other in text or text.partition("#")[0].rstrip().endswith(one)):
+        if first_text in text and (second_text in text or text.partition("#")[0].rstrip().endswith(first_text)):
             return number
     return statement.line
 
 
 def _check_uncalled_function(listing: Listing, statement: Statement) -> str:
     tokens = statement.tokens
-    for place, token in enumerate(tokens[:-1]):
-        sign = tokens[place + 1]
+    for index, token in enumerate(tokens[:-1]):
+        sign = tokens[index + 1]
         if token in _PARAMETERLESS_FUNCTIONS and sign in COMPARISONS:
-            begin = place - 2 if place > 1 and tokens[place - 1] == "." else place
-            name = join_tokens(tokens[begin : place + 1])
-            compared = join_tokens(tokens[begin : place + 3])
+            start = index - 2 if index > 1 and tokens[index - 1] == "." else index
+            name = join_tokens(tokens[start : index + 1])
+            comparison = join_tokens(tokens[start : index + 3])
             return (
                 f"{listing.locate(statement.line)}: {token} is a function. Without brackets it is not called, so "
-                f"{compared} does not compare its result. Write {name}()"
+                f"{comparison} does not compare its result. Write {name}()"
             )
     return ""
 
@@ -182,9 +202,9 @@ def _check_uncalled_function(listing: Listing, statement: Statement) -> str:
 def _check_reading_as_text(listing: Listing, statement: Statement) -> str:
     """Return a hint on a sensor's number that is compared with a text."""
     tokens = statement.tokens
-    for place in range(1, len(tokens) - 1):
-        sign, text = tokens[place : place + 2]
-        reading = find_reading(tokens[place - 1 : place], listing.code)
+    for index in range(1, len(tokens) - 1):
+        sign, text = tokens[index : index + 2]
+        reading = find_reading(tokens[index - 1 : index], listing.code)
         if sign not in ("==", "!=") or not _TEXT.match(text) or reading not in READINGS:
             continue
         fix = "Write color_name in place of color" if reading == "color" else f"Write {text[1:-1]} without quotes"
@@ -197,17 +217,17 @@ def _check_empty_range(listing: Listing, statement: Statement) -> str:
     if statement.keyword != "for" or call is None or len(call.arguments) < 2:
         return ""
     numbers = [listing.code.number(each) for each in call.arguments]
-    begin, end, step = (*numbers, 1.0)[:3]
-    if begin is None or end is None or not step or (end - begin) * step > 0:
+    start, end, step = (*numbers, 1.0)[:3]
+    if start is None or end is None or not step or (end - start) * step > 0:
         return ""
-    shown = f"range({format_arguments(call.arguments)})"
-    if step > 0 and begin > end:
-        fix = f"To count down to {end:g}, write range({begin:g}, {end - 1:g}, -1)"
-    elif step < 0 and begin < end:
-        fix = f"To count up to {end:g}, write range({begin:g}, {end + 1:g})"
+    range_call = f"range({format_arguments(call.arguments)})"
+    if step > 0 and start > end:
+        fix = f"To count down to {end:g}, write range({start:g}, {end - 1:g}, -1)"
+    elif step < 0 and start < end:
+        fix = f"To count up to {end:g}, write range({start:g}, {end + 1:g})"
     else:
         fix = "The end is never reached: write a larger end" if step > 0 else "Write a smaller end"
-    return f"{listing.locate(statement.line)}: {shown} is empty, so the loop never runs. {fix}"
+    return f"{listing.locate(statement.line)}: {range_call} is empty, so the loop never runs. {fix}"
 
 
 def format_arguments(arguments: Sequence[Sequence[str]]) -> str:
@@ -235,43 +255,47 @@ def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
     code = listing.code
     if statement.keyword != "if" or len(statement.condition) != 3 or statement.condition[1] not in _ORDER_SIGNS:
         return ""
-    following = code.find_next_outside(statement)
-    if following is None or following.keyword != "if" or following.indent != statement.indent:
+    next_statement = code.find_next_outside(statement)
+    if next_statement is None or next_statement.keyword != "if" or next_statement.indent != statement.indent:
         return ""
-    last: Statement | None = following
-    while last is not None and last.keyword in ("if", "elif") and last.condition[:2] == statement.condition[:2]:
-        last = code.find_next_outside(last)
-    ends = any(each.keyword in ("return", "break", "continue") for each in code.list_body(statement))
-    first, second = (code.number(each.condition[2:]) for each in (statement, following))
-    if last is None or last.keyword != "else" or last.indent != statement.indent or ends:
+    next_branch: Statement | None = next_statement
+    while (
+        next_branch is not None
+        and next_branch.keyword in ("if", "elif")
+        and next_branch.condition[:2] == statement.condition[:2]
+    ):
+        next_branch = code.find_next_outside(next_branch)
+    has_exit = any(each.keyword in ("return", "break", "continue") for each in code.list_body(statement))
+    first_limit, second_limit = (code.number(each.condition[2:]) for each in (statement, next_statement))
+    if next_branch is None or next_branch.keyword != "else" or next_branch.indent != statement.indent or has_exit:
         return ""
-    if following.condition[:2] != statement.condition[:2] or first is None or second is None:
+    if next_statement.condition[:2] != statement.condition[:2] or first_limit is None or second_limit is None:
         return ""
-    if (first > second) != (statement.condition[1] in (">", ">=")):
+    if (first_limit > second_limit) != (statement.condition[1] in (">", ">=")):
         return ""
     return (
-        f"{listing.locate(following.line)}: this if is also checked when the if in line {statement.line} was "
+        f"{listing.locate(next_statement.line)}: this if is also checked when the if in line {statement.line} was "
         "true, so both "
         "run. Write elif in place of if"
     )
 
 
-def _split_operands(tokens: Sequence[str], levels: Sequence[int], place: int) -> tuple[list[str], list[str]]:
+def _split_operands(tokens: Sequence[str], levels: Sequence[int], index: int) -> tuple[list[str], list[str]]:
     """Return the tokens to the left and right of one, within the same bracket and operand."""
     stops = ("and", "or", ",", ":", "=", "return", "if", "while")
 
-    def side(step: int) -> list[str]:
-        found: list[str] = []
-        at = place + step
-        while 0 <= at < len(tokens) and levels[at] >= levels[place]:
-            if levels[at] == levels[place]:
-                if tokens[at] in stops:
+    def collect_operand(step: int) -> list[str]:
+        operand: list[str] = []
+        position = index + step
+        while 0 <= position < len(tokens) and levels[position] >= levels[index]:
+            if levels[position] == levels[index]:
+                if tokens[position] in stops:
                     break
-                found.append(tokens[at])
-            at += step
-        return found
+                operand.append(tokens[position])
+            position += step
+        return operand
 
-    return side(-1), side(1)
+    return collect_operand(-1), collect_operand(1)
 
 
 _SLIP_CHECKS: Sequence[_SlipCheck] = (

@@ -29,24 +29,27 @@ _SHORT_RUN_SECONDS = 1.0
 
 def hint_about_missing_brackets(clues: Clues) -> Iterator[str]:
     """Yield a hint on a function that is named as a statement, and so not called."""
-    for listing, each in collect_statements(clues):
-        name = join_tokens(each.tokens)
-        last = each.tokens[-1]
-        own = {function.tokens[1] for function in listing.code.list_functions()}
-        dotted = all(is_name(token) or token == "." for token in each.tokens)
-        if dotted and (name in own or (last in ACTIONS and (len(each.tokens) > 1 or name in _OUTPUT_FUNCTIONS))):
-            yield f"{listing.locate(each.line)} names {name} without brackets, so it is not called. Write {name}()"
+    for listing, statement in collect_statements(clues):
+        name = join_tokens(statement.tokens)
+        last_token = statement.tokens[-1]
+        function_names = {function.tokens[1] for function in listing.code.list_functions()}
+        is_dotted = all(is_name(token) or token == "." for token in statement.tokens)
+        if is_dotted and (
+            name in function_names
+            or (last_token in ACTIONS and (len(statement.tokens) > 1 or name in _OUTPUT_FUNCTIONS))
+        ):
+            yield f"{listing.locate(statement.line)} names {name} without brackets, so it is not called. Write {name}()"
             return
 
 
 def hint_about_replaced_function(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say = ...``, which overwrites a function instead of calling it."""
-    for listing, each in collect_statements(clues):
-        if each.target in _OUTPUT_FUNCTIONS and _TEXT.match(each.tokens[2]):
-            value = join_tokens(each.tokens[2:])
+    for listing, statement in collect_statements(clues):
+        if statement.target in _OUTPUT_FUNCTIONS and _TEXT.match(statement.tokens[2]):
+            value = join_tokens(statement.tokens[2:])
             yield (
-                f"{listing.locate(each.line)} replaces {each.target} with a text, and does not call it. "
-                f"Write {each.target}({value})"
+                f"{listing.locate(statement.line)} replaces {statement.target} with a text, and does not call it. "
+                f"Write {statement.target}({value})"
             )
             return
 
@@ -57,24 +60,24 @@ def hint_about_uncalled_function(clues: Clues) -> Iterator[str]:
         return
     for listing in clues.programs:
         heads = {each.tokens[1]: each for each in listing.code.list_functions()}
-        used = {token for each in listing.code.statements if each.keyword != "def" for token in each.tokens}
-        idle = {
+        used_names = {token for each in listing.code.statements if each.keyword != "def" for token in each.tokens}
+        idle_statements = {
             number
             for name, head in heads.items()
-            if name not in used
+            if name not in used_names
             for number in _list_statement_numbers(listing, head)
         }
-        done = {
+        achieved_effects = {
             _classify_effect(call.name)
             for each in listing.code.statements
-            if each.number not in idle
+            if each.number not in idle_statements
             for call in each.calls
         }
         for name, head in heads.items():
             effects = {_classify_effect(call.name) for each in listing.code.list_body(head) for call in each.calls} - {
                 ""
             }
-            if name not in used and effects and not effects & done:
+            if name not in used_names and effects and not effects & achieved_effects:
                 yield (
                     f"{listing.locate(head.line)} defines {name}, but it is never called. Write "
                     f"{_format_call(head)} below "
@@ -97,12 +100,14 @@ def _classify_effect(name: str) -> str:
 
 def hint_about_discarded_value(clues: Clues) -> Iterator[str]:
     """Yield a hint on a statement that computes a value and discards it."""
-    called = clues.responder_process_listings if any(isinstance(each, Functions) for each in clues.lost) else ()
-    answering = ((listing, each) for listing in called for each in listing.code.statements)
-    for listing, each in (*collect_statements(clues), *answering):
-        effect = describe_discarded_value(each, listing.code)
+    called_listings = (
+        clues.responder_process_listings if any(isinstance(each, Functions) for each in clues.lost) else ()
+    )
+    called_statements = ((listing, each) for listing in called_listings for each in listing.code.statements)
+    for listing, statement in (*collect_statements(clues), *called_statements):
+        effect = describe_discarded_value(statement, listing.code)
         if effect:
-            yield f"{listing.locate(each.line)}: {effect}. {suggest_correct_statement(each)}"
+            yield f"{listing.locate(statement.line)}: {effect}. {suggest_correct_statement(statement)}"
             return
 
 
@@ -110,13 +115,15 @@ def hint_about_single_reading(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``if`` on a sensor where the robot should continue until a reading."""
     if clues.seconds > _SHORT_RUN_SECONDS and not clues.is_stationary:
         return
-    for listing, each in collect_statements(clues):
-        reads = each.keyword == "if" and any(token in PROPERTIES for token in each.condition)
-        drives = any(has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: each.number])
-        if reads and drives and not listing.code.list_enclosing_loops(each):
-            text = join_tokens(each.tokens[1:])
+    for listing, statement in collect_statements(clues):
+        is_reading = statement.keyword == "if" and any(token in PROPERTIES for token in statement.condition)
+        is_driving = any(
+            has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
+        )
+        if is_reading and is_driving and not listing.code.list_enclosing_loops(statement):
+            text = join_tokens(statement.tokens[1:])
             yield (
-                f"{listing.locate(each.line)} reads the sensor only once, because if does not repeat. To repeat "
+                f"{listing.locate(statement.line)} reads the sensor only once, because if does not repeat. To repeat "
                 "as long as "
                 f"this is true, write while {text}"
             )
@@ -125,17 +132,18 @@ def hint_about_single_reading(clues: Clues) -> Iterator[str]:
 
 def hint_about_stop_in_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on motors that are switched off in the loop where they should run."""
-    for listing, each in collect_statements(clues):
-        body = listing.code.list_body(each) if each.keyword == "while" else ()
-        direct = [one for one in body if one.parent == each.number]
-        stop = next((one for one in direct if has_motor_call(one, _STOP_METHODS)), None)
+    for listing, statement in collect_statements(clues):
+        body = listing.code.list_body(statement) if statement.keyword == "while" else ()
+        direct_statements = [one for one in body if one.parent == statement.number]
+        stop = next((one for one in direct_statements if has_motor_call(one, _STOP_METHODS)), None)
         if stop is None or any(
-            has_motor_call(one, CONTINUOUS_MOVES | LIMITED_MOVES) or one.keyword in ("break", "if") for one in direct
+            has_motor_call(one, CONTINUOUS_MOVES | LIMITED_MOVES) or one.keyword in ("break", "if")
+            for one in direct_statements
         ):
             continue
-        if any(has_motor_call(one, CONTINUOUS_MOVES) for one in listing.code.statements[: each.number]):
+        if any(has_motor_call(one, CONTINUOUS_MOVES) for one in listing.code.statements[: statement.number]):
             yield (
-                f"{listing.locate(stop.line)} switches the motors off in the loop in line {each.line}, so the "
+                f"{listing.locate(stop.line)} switches the motors off in the loop in line {statement.line}, so the "
                 "robot stops "
                 "in the first pass of the loop. Move the line below the loop: remove its indentation"
             )
@@ -144,26 +152,26 @@ def hint_about_stop_in_loop(clues: Clues) -> Iterator[str]:
 
 def hint_about_unindented_statement(clues: Clues) -> Iterator[str]:
     """Yield a hint on a statement after a loop that should be inside it."""
-    drives = any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost)
-    for listing, each in collect_statements(clues):
-        below = listing.code.find_next_outside(each) if each.keyword == "for" else None
-        if below is None or below.indent != each.indent or below.keyword in LOOPS:
+    is_driving_required = any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost)
+    for listing, statement in collect_statements(clues):
+        following = listing.code.find_next_outside(statement) if statement.keyword == "for" else None
+        if following is None or following.indent != statement.indent or following.keyword in LOOPS:
             continue
-        variable = each.tokens[1]
-        uses = (
+        variable = statement.tokens[1]
+        is_variable_used = (
             is_name(variable)
-            and below.has_token(variable)
-            and variable not in below.bound_names
-            and below.keyword != "def"
+            and following.has_token(variable)
+            and variable not in following.bound_names
+            and following.keyword != "def"
         )
-        drives_on = (
-            drives
-            and has_motor_call(below, LIMITED_MOVES)
-            and any(has_motor_call(one, LIMITED_MOVES) for one in listing.code.list_body(each))
+        is_move_repeated = (
+            is_driving_required
+            and has_motor_call(following, LIMITED_MOVES)
+            and any(has_motor_call(one, LIMITED_MOVES) for one in listing.code.list_body(statement))
         )
-        if uses or drives_on:
+        if is_variable_used or is_move_repeated:
             yield (
-                f"{listing.locate(below.line)} is outside the loop of line {each.line}, so it runs only once, "
+                f"{listing.locate(following.line)} is outside the loop of line {statement.line}, so it runs only once, "
                 "after it. "
                 "If it belongs to the loop, indent it like the lines above"
             )
@@ -176,9 +184,9 @@ def collect_statements(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
         yield from ((listing, each) for listing in clues.programs for each in listing.code.statements)
 
 
-def has_motor_call(statement: Statement, how: frozenset[str]) -> bool:
+def has_motor_call(statement: Statement, methods: frozenset[str]) -> bool:
     """Return whether the statement calls one of these methods of a motor or motor pair."""
-    return any("." in call.name and call.name.rpartition(".")[2] in how for call in statement.calls)
+    return any("." in call.name and call.name.rpartition(".")[2] in methods for call in statement.calls)
 
 
 def _format_call(head: Statement) -> str:

@@ -34,31 +34,31 @@ def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statem
 
 
 def _advise_on_else_if(line: str) -> str:
-    found = _ELSE_IF.match(line)
-    if found is None:
+    match = _ELSE_IF.match(line)
+    if match is None:
         return ""
-    words = " ".join(found[1].split())
-    return f"Python has no {words}. Write elif in place of {words}."
+    keyword = " ".join(match[1].split())
+    return f"Python has no {keyword}. Write elif in place of {keyword}."
 
 
 def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
     """Return the fix of a line that is not indented deeper than the block's head above it."""
-    found = _NO_BLOCK.match(fault.message)
-    if found is None:
+    match = _NO_BLOCK.match(fault.message)
+    if match is None:
         return ""
-    head = int(found[2])
-    deep = _count_indent("".join(listing.lines[head - 1 : head])) + _INDENT_WIDTH
+    head = int(match[2])
+    width = _count_indent("".join(listing.lines[head - 1 : head])) + _INDENT_WIDTH
     if not line.strip() or fault.line == head:
-        return f"Write the lines that belong to line {head} below it. Begin each with {deep} blanks."
-    return f"If line {fault.line} belongs to line {head}, indent it: begin line {fault.line} with {deep} blanks."
+        return f"Write the lines that belong to line {head} below it. Begin each with {width} blanks."
+    return f"If line {fault.line} belongs to line {head}, indent it: begin line {fault.line} with {width} blanks."
 
 
 def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
     """Return the line with its missing closing quote."""
-    found = _UNCLOSED_TEXT.match(fault.message)
-    if found is None:
+    match = _UNCLOSED_TEXT.match(fault.message)
+    if match is None:
         return ""
-    if found[1]:
+    if match[1]:
         return "A text that begins with three quotes must end with three quotes."
     opening = _find_open_quote(line)
     if opening is None:
@@ -66,17 +66,20 @@ def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
     quote, text = line[opening], line[opening + 1 :]
     if quote == "'" and re.search(r"\w'\w", line):
         return "The ' in the text ends it. Put \" around the text."
-    before = line[:opening]
-    words, end = _split_end(text.rstrip(), before.count("(") - before.count(")"))
-    other = "'" if quote == '"' else '"'
-    return f"The text has no closing {quote}. Write {before.strip()}{quote}{words.removesuffix(other)}{quote}{end}"
+    line_start = line[:opening]
+    text_content, end = _split_end(text.rstrip(), line_start.count("(") - line_start.count(")"))
+    other_quote = "'" if quote == '"' else '"'
+    return (
+        f"The text has no closing {quote}. Write "
+        f"{line_start.strip()}{quote}{text_content.removesuffix(other_quote)}{quote}{end}"
+    )
 
 
 def _split_end(text: str, brackets: int) -> tuple[str, str]:
     """Split a text into its words and the code after them: closing brackets, or a named argument."""
-    named = _KEYWORD_ARGUMENT.search(text) if brackets > 0 else None
-    if named is not None:
-        return text[: named.start()], text[named.start() :]
+    argument_match = _KEYWORD_ARGUMENT.search(text) if brackets > 0 else None
+    if argument_match is not None:
+        return text[: argument_match.start()], text[argument_match.start() :]
     end = ""
     while text.endswith(")") and len(end) < brackets:
         text, end = text[:-1], f"{end})"
@@ -86,16 +89,16 @@ def _split_end(text: str, brackets: int) -> tuple[str, str]:
 def _find_open_quote(line: str) -> int | None:
     """Return the position of an opening quote that is never closed; None if there is none."""
     opening: int | None = None
-    skip = False
-    for place, letter in enumerate(line):
-        if skip:
-            skip = False
+    is_escaped = False
+    for index, letter in enumerate(line):
+        if is_escaped:
+            is_escaped = False
         elif opening is None and letter == "#":
             return None
         elif letter == "\\":
-            skip = True
+            is_escaped = True
         elif opening is None and letter in "\"'":
-            opening = place
+            opening = index
         elif opening is not None and letter == line[opening]:
             opening = None
     return opening
@@ -103,13 +106,13 @@ def _find_open_quote(line: str) -> int | None:
 
 def _advise_on_unquoted_words(line: str, listing: Listing) -> str:
     """Return advice on unquoted words in the brackets of a call."""
-    found = _WORDS.search(line)
-    if found is None or _NO_TEXT.search(found[2]):
+    match = _WORDS.search(line)
+    if match is None or _NO_TEXT.search(match[2]):
         return ""
-    known = {name for each in listing.code.statements for name in each.bound_names}
-    if set(found[2].split()) <= known:
+    bound_names = {name for each in listing.code.statements for name in each.bound_names}
+    if set(match[2].split()) <= bound_names:
         return ""
-    return f'A text needs quotes: write {found[1]}("{found[2]}"{line[found.end() :].strip()}'
+    return f'A text needs quotes: write {match[1]}("{match[2]}"{line[match.end() :].strip()}'
 
 
 def _count_indent(line: str) -> int:

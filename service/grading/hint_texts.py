@@ -43,21 +43,21 @@ class ExpectedText:
         if self.how == "equals":
             yield " ".join(words)
             return
-        places = range(1 if self.how == "starts_with" else max(len(words) - count + 1, 1))
-        yield from (" ".join(words[place : place + count]) for place in places)
+        starts = range(1 if self.how == "starts_with" else max(len(words) - count + 1, 1))
+        yield from (" ".join(words[place : place + count]) for place in starts)
 
     def is_met_by(self, text: str, *, ignore_case: bool) -> bool:
         """Return whether the text matches, by the criterion's rules."""
-        given, plain = (" ".join(each.split()) for each in (text, self.text))
+        actual, expected = (" ".join(each.split()) for each in (text, self.text))
         if ignore_case:
-            given, plain = given.casefold(), plain.casefold()
+            actual, expected = actual.casefold(), expected.casefold()
         match self.how:
             case "equals":
-                return given == plain
+                return actual == expected
             case "starts_with":
-                return given.startswith(plain)
+                return actual.startswith(expected)
             case _:
-                return plain in given
+                return expected in actual
 
 
 def hint_about_sent_texts(clues: Clues) -> Iterator[str]:
@@ -73,34 +73,42 @@ def hint_about_texts(clues: Clues) -> Iterator[str]:
 def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
     for criterion in criteria:
         part, texts, verb = _find_checked_texts(criterion, clues)
-        wanted = list(_collect_expected_texts(criterion))
-        folds = getattr(criterion, "ignore_case", False)
-        strange = [text for text in texts if not any(each.is_met_by(text, ignore_case=folds) for each in wanted)]
-        for each in wanted:
-            if any(each.is_met_by(text, ignore_case=folds) for text in texts):
+        expected_texts = list(_collect_expected_texts(criterion))
+        should_ignore_case = getattr(criterion, "ignore_case", False)
+        unexpected_texts = [
+            text
+            for text in texts
+            if not any(each.is_met_by(text, ignore_case=should_ignore_case) for each in expected_texts)
+        ]
+        for expected_text in expected_texts:
+            if any(expected_text.is_met_by(text, ignore_case=should_ignore_case) for text in texts):
                 continue
-            near = next((text for text in strange[:_MOST_TEXTS] if is_near(each, text)), None)
-            if near is not None:
-                at = {"equals": "", "starts_with": " at its start"}.get(each.how, " in it")
+            similar_text = next((text for text in unexpected_texts[:_MOST_TEXTS] if is_near(expected_text, text)), None)
+            if similar_text is not None:
+                position = {"equals": "", "starts_with": " at its start"}.get(expected_text.how, " in it")
                 yield (
-                    f"{describe_quoting_line(clues, part, near)} {verb} {quote_text(near)}; expected "
-                    f"{quote_text(each.text)}{at}"
+                    f"{describe_quoting_line(clues, part, similar_text)} {verb} {quote_text(similar_text)}; expected "
+                    f"{quote_text(expected_text.text)}{position}"
                 )
                 break
 
 
 def hint_about_unspoken_text(clues: Clues) -> Iterator[str]:
     """Yield a hint on a text that is printed instead of said, if nothing is said."""
-    wanted = [list(_collect_expected_texts(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)]
+    texts_by_criterion = [
+        list(_collect_expected_texts(each)) for each in clues.lost if isinstance(each, Says) or _is_spoken(each)
+    ]
     # After an error, the missing speech may have no other cause.
-    if clues.spoken or not wanted or any(fault.verdict is Verdict.PROGRAM_ERROR for fault in clues.faults):
+    if clues.spoken or not texts_by_criterion or any(fault.verdict is Verdict.PROGRAM_ERROR for fault in clues.faults):
         return
-    asked = [one for each in wanted for one in each]
-    printed = [text for text in clues.printed if classify_text(text) == "text" and not text.endswith(_LOGGED)]
-    meant = (text for text in printed if not asked or any(is_near(each, text) for each in asked))
-    for text in list(meant)[-1:]:
-        where = describe_quoting_line(clues, "program", text)
-        yield f"{where} prints {quote_text(text)}, and nothing is said; expected say(...), which prints as well"
+    expected_texts = [one for each in texts_by_criterion for one in each]
+    printed_texts = [text for text in clues.printed if classify_text(text) == "text" and not text.endswith(_LOGGED)]
+    candidates = (
+        text for text in printed_texts if not expected_texts or any(is_near(each, text) for each in expected_texts)
+    )
+    for text in list(candidates)[-1:]:
+        location = describe_quoting_line(clues, "program", text)
+        yield f"{location} prints {quote_text(text)}, and nothing is said; expected say(...), which prints as well"
 
 
 def hint_about_missing_series(clues: Clues) -> Iterator[str]:
@@ -108,9 +116,9 @@ def hint_about_missing_series(clues: Clues) -> Iterator[str]:
     for criterion in clues.lost:
         if not isinstance(criterion, Datalog) or clues.missing is not None:
             continue
-        begin = ExpectedText(f"{criterion.series}:", "starts_with")
-        near = any(is_near(begin, text) or begin.is_met_by(text, ignore_case=True) for text in clues.printed)
-        if near or any(True for _ in clues.faults):
+        label = ExpectedText(f"{criterion.series}:", "starts_with")
+        has_label = any(is_near(label, text) or label.is_met_by(text, ignore_case=True) for text in clues.printed)
+        if has_label or any(True for _ in clues.faults):
             continue
         name = next((each.name for each in clues.programs), "the notebook")
         yield (
@@ -145,36 +153,38 @@ def _collect_expected_texts(criterion: Criterion) -> Iterator[ExpectedText]:
     if isinstance(criterion, Datalog):
         yield ExpectedText(f"{criterion.series}:", "starts_with")
     if isinstance(criterion, TextSequence | Replies):
-        for how in ("equals", "starts_with", "contains"):
-            yield from (ExpectedText(text, how) for text in getattr(criterion, how))
+        for comparison in ("equals", "starts_with", "contains"):
+            yield from (ExpectedText(text, comparison) for text in getattr(criterion, comparison))
     if isinstance(criterion, TextSequence) and criterion.compare != "matches":
         yield from (ExpectedText(text, criterion.compare) for text in criterion.in_order)
     if isinstance(criterion, Replies):
         yield from (ExpectedText(text, "equals") for text in criterion.expect.values() if isinstance(text, str))
 
 
-def is_near(wanted: ExpectedText, text: str) -> bool:
+def is_near(expected: ExpectedText, text: str) -> bool:
     """Return whether a part of the text is close to the expected text."""
-    if len(wanted.text) > _LONGEST or len(text) > _LONGEST:
+    if len(expected.text) > _LONGEST or len(text) > _LONGEST:
         return False
-    return any(_is_similar(part, wanted.text) for part in wanted.split_parts(text))
+    return any(_is_similar(part, expected.text) for part in expected.split_parts(text))
 
 
-def _is_similar(one: str, other: str) -> bool:
+def _is_similar(actual: str, reference: str) -> bool:
     """Return whether the texts differ by a few characters, and not only by numbers."""
-    plain, expected = (_DIGITS.sub("0", each) for each in (one, other))
-    if plain == expected or not any(letter.isalpha() for letter in expected):
+    actual_pattern, expected_pattern = (_DIGITS.sub("0", each) for each in (actual, reference))
+    if actual_pattern == expected_pattern or not any(letter.isalpha() for letter in expected_pattern):
         return False
-    return difflib.SequenceMatcher(None, plain.casefold(), expected.casefold()).ratio() >= _MIN_SIMILARITY
+    return (
+        difflib.SequenceMatcher(None, actual_pattern.casefold(), expected_pattern.casefold()).ratio() >= _MIN_SIMILARITY
+    )
 
 
 def describe_quoting_line(clues: Clues, part: Part, text: str) -> str:
     """Return the line that quotes the longest beginning of the text."""
     words = text.split()
     for count in range(min(len(words), 12), 0, -1):
-        begin = " ".join(words[:count])
+        opening = " ".join(words[:count])
         for listing in clues.list_texts(part):
             for number, line in enumerate(listing.lines, 1):
-                if len(begin) > 2 and begin in line and _QUOTE.search(line):
+                if len(opening) > 2 and opening in line and _QUOTE.search(line):
                     return listing.locate(number)
     return PART_FILES[part] if any(each.part == part for each in clues.listings) else "the notebook"

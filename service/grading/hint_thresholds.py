@@ -37,15 +37,15 @@ def hint_about_thresholds(clues: Clues) -> Iterator[str]:
         if not isinstance(criterion, StopOn) or criterion.zone is None or criterion.sensor == "either":
             continue
         for listing, loop in _collect_last_loops(clues):
-            found = _find_threshold(listing, loop, _SENSORS[criterion.sensor])
-            for recording in clues.recordings if found else ():
-                passed = _find_zone_readings(recording, criterion.sensor, criterion.zone)
-                if passed is None or found is None:
+            threshold = _find_threshold(listing, loop, _SENSORS[criterion.sensor])
+            for recording in clues.recordings if threshold else ():
+                readings = _find_zone_readings(recording, criterion.sensor, criterion.zone)
+                if readings is None or threshold is None:
                     continue
-                sign, number = found
-                why = _explain_missed_zone(sign, number, *passed)
-                if why:
-                    yield f"{listing.locate(loop.line)}: {why}"
+                sign, number = threshold
+                explanation = _explain_missed_zone(sign, number, *readings)
+                if explanation:
+                    yield f"{listing.locate(loop.line)}: {explanation}"
                     return
 
 
@@ -57,11 +57,11 @@ def hint_about_joined_colours(clues: Clues) -> Iterator[str]:
         sides = list(_SENSORS) if criterion.sensor == "either" else [criterion.sensor]
         for listing, statement in collect_statements(clues):
             for recording in clues.recordings:
-                ends = [_read_end_colour(recording, side) for side in sides if len(recording.ticks)]
-                for end in ends:
-                    why = _hint_about_wrong_word(listing.code, statement, end, criterion.rgb)
-                    if why:
-                        yield f"{listing.locate(statement.line)}: {why}"
+                end_colours = [_read_end_colour(recording, side) for side in sides if len(recording.ticks)]
+                for end_colour in end_colours:
+                    explanation = _hint_about_wrong_word(listing.code, statement, end_colour, criterion.rgb)
+                    if explanation:
+                        yield f"{listing.locate(statement.line)}: {explanation}"
                         return
 
 
@@ -74,47 +74,50 @@ def _collect_last_loops(clues: Clues) -> Iterator[tuple[Listing, Statement]]:
 
 def _find_threshold(listing: Listing, loop: Statement, sensor: str) -> tuple[str, float] | None:
     """Return the sign and number that the sensor's reading is compared with; None for other conditions."""
-    place = next((at for at, token in enumerate(loop.condition) if token in _COMPARISON_FUNCTIONS), None)
-    if place is None or any(token in ("and", "or", "not") for token in loop.condition):
+    sign_index = next((at for at, token in enumerate(loop.condition) if token in _COMPARISON_FUNCTIONS), None)
+    if sign_index is None or any(token in ("and", "or", "not") for token in loop.condition):
         return None
-    reading = loop.condition[:place]
+    reading = loop.condition[:sign_index]
     if len(reading) == 1:
-        given = [each.tokens[2:] for each in listing.code.statements if each.target == reading[0]]
-        reading = given[0] if given and all(each == given[0] for each in given) else ()
-    number = listing.code.number(loop.condition[place + 1 :])
-    is_this = tuple(reading) == (sensor, ".", _PERCENT) and loop.condition[place] in ("<", ">", "<=", ">=")
-    return (loop.condition[place], number) if is_this and number is not None else None
+        values = [each.tokens[2:] for each in listing.code.statements if each.target == reading[0]]
+        reading = values[0] if values and all(each == values[0] for each in values) else ()
+    number = listing.code.number(loop.condition[sign_index + 1 :])
+    is_this = tuple(reading) == (sensor, ".", _PERCENT) and loop.condition[sign_index] in ("<", ">", "<=", ">=")
+    return (loop.condition[sign_index], number) if is_this and number is not None else None
 
 
 def _find_zone_readings(
     recording: Recording, side: Side, zone: tuple[float, float, float, float]
 ) -> tuple[Floats, Floats] | None:
     """Return the readings before and in the zone, in percent; None if the robot did not drive through the zone."""
-    places = compute_positions(recording, "left_light" if side == "left" else "right_light")[1:]
+    positions = compute_positions(recording, "left_light" if side == "left" else "right_light")[1:]
     left, bottom, right, top = zone
-    x, y = places[:, 0], places[:, 1]
-    inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
-    if not inside.any() or inside[-1] or inside[0]:
+    x, y = positions[:, 0], positions[:, 1]
+    is_inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+    if not is_inside.any() or is_inside[-1] or is_inside[0]:
         return None
     rgb = recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb
-    reads = 100 * rgb[:, 0].astype(int) / 255
-    first = int(inside.argmax())
-    return reads[:first], reads[inside]
+    percentages = 100 * rgb[:, 0].astype(int) / 255
+    first_index = int(is_inside.argmax())
+    return percentages[:first_index], percentages[is_inside]
 
 
-def _explain_missed_zone(sign: str, number: float, before: Floats, within: Floats) -> str:
+def _explain_missed_zone(sign: str, number: float, readings_before: Floats, zone_readings: Floats) -> str:
     """Return why a loop did not end in the zone, if another threshold would have ended it there; otherwise empty."""
-    holds = _COMPARISON_FUNCTIONS[sign]
-    if not all(holds(float(each), number) for each in within):
+    compare = _COMPARISON_FUNCTIONS[sign]
+    if not all(compare(float(each), number) for each in zone_readings):
         return ""
-    falls = sign in (">", ">=")
-    there, earlier = (within.min(), before.min()) if falls else (within.max(), before.max())
-    if (earlier - there if falls else there - earlier) < _MIN_DIFFERENCE:
+    is_falling = sign in (">", ">=")
+    zone_extreme, earlier_extreme = (
+        (zone_readings.min(), readings_before.min()) if is_falling else (zone_readings.max(), readings_before.max())
+    )
+    if (earlier_extreme - zone_extreme if is_falling else zone_extreme - earlier_extreme) < _MIN_DIFFERENCE:
         return ""
-    least, most = sorted((float(there), float(earlier)))
+    minimum, maximum = sorted((float(zone_extreme), float(earlier_extreme)))
     return (
-        f"the loop goes on, because the sensor reads {there:.1f} where the robot should stop, and {there:.1f} {sign} "
-        f"{number:g} is true. Choose a number between {least:.1f} and {most:.1f}"
+        f"the loop goes on, because the sensor reads {zone_extreme:.1f} where the robot should stop, and "
+        f"{zone_extreme:.1f} {sign} "
+        f"{number:g} is true. Choose a number between {minimum:.1f} and {maximum:.1f}"
     )
 
 
@@ -123,23 +126,27 @@ def _read_end_colour(recording: Recording, side: Side) -> _Colour:
     return [float(part) for part in rgb[-1]]
 
 
-def _hint_about_wrong_word(code: CodeStatements, statement: Statement, end: _Colour, wanted: _Colour) -> str:
+def _hint_about_wrong_word(code: CodeStatements, statement: Statement, end: _Colour, expected: _Colour) -> str:
     """Return a hint that ``and`` or ``or`` is wrong; empty if the colours don't prove it."""
     pair = _parse_comparison_pair(code, statement)
     if pair is None:
         return ""
-    word, comparisons, stops = pair
-    ended = [_is_comparison_true(each, end) for each in comparisons]
-    meant = [_is_comparison_true(each, wanted) for each in comparisons]
+    word, comparisons, is_stop = pair
+    end_results = [_is_comparison_true(each, end) for each in comparisons]
+    expected_results = [_is_comparison_true(each, expected) for each in comparisons]
     # With the other word, the loop would have continued here and ended over the required colour.
-    if ended[0] == ended[1] or meant != [stops, stops] or (word == "or") != stops:
+    if end_results[0] == end_results[1] or expected_results != [is_stop, is_stop] or (word == "or") != is_stop:
         return ""
-    other = "and" if word == "or" else "or"
-    one = comparisons[ended.index(stops)]
-    what = f"{one[0]} {one[1]} {one[2]:g}"
-    seen = ", ".join(str(int(part)) for part in end)
-    because = f"{word} lets {what} alone end it" if stops else f"{word} ends it as soon as {what} is false"
-    return f"the loop ended over the colour ({seen}), because {because}. Write {other} in place of {word}"
+    other_word = "and" if word == "or" else "or"
+    decisive_comparison = comparisons[end_results.index(is_stop)]
+    comparison_text = f"{decisive_comparison[0]} {decisive_comparison[1]} {decisive_comparison[2]:g}"
+    colour_text = ", ".join(str(int(part)) for part in end)
+    reason = (
+        f"{word} lets {comparison_text} alone end it"
+        if is_stop
+        else f"{word} ends it as soon as {comparison_text} is false"
+    )
+    return f"the loop ended over the colour ({colour_text}), because {reason}. Write {other_word} in place of {word}"
 
 
 _Comparison = tuple[str, str, float, int]
@@ -149,29 +156,35 @@ def _parse_comparison_pair(code: CodeStatements, statement: Statement) -> tuple[
     """Return the word between two colour comparisons, the comparisons, and whether the loop ends if they are true."""
     tokens = statement.condition
     if statement.keyword == "while" and tokens[:2] == ("not", "(") and tokens[-1:] == (")",):
-        tokens, stops = tokens[2:-1], True
+        tokens, is_stop = tokens[2:-1], True
     elif statement.keyword == "while":
-        stops = False
+        is_stop = False
     elif statement.keyword == "if" and any(each.keyword == "break" for each in code.list_body(statement)):
-        stops = True
+        is_stop = True
     else:
         return None
-    words = [at for at, token in enumerate(tokens) if token in ("and", "or", "not")]
-    if len(words) != 1 or tokens[words[0]] == "not":
+    word_indices = [at for at, token in enumerate(tokens) if token in ("and", "or", "not")]
+    if len(word_indices) != 1 or tokens[word_indices[0]] == "not":
         return None
-    found = [_parse_comparison(code, side) for side in (tokens[: words[0]], tokens[words[0] + 1 :])]
-    comparisons = [each for each in found if each is not None]
-    return (tokens[words[0]], comparisons, stops) if len(comparisons) == 2 else None
+    parsed_sides = [
+        _parse_comparison(code, side) for side in (tokens[: word_indices[0]], tokens[word_indices[0] + 1 :])
+    ]
+    comparisons = [each for each in parsed_sides if each is not None]
+    return (tokens[word_indices[0]], comparisons, is_stop) if len(comparisons) == 2 else None
 
 
 def _parse_comparison(code: CodeStatements, tokens: Sequence[str]) -> _Comparison | None:
     """Return the operand, the sign, the number and the colour channel of a comparison; otherwise None."""
-    place = next((at for at, token in enumerate(tokens) if token in _COMPARISON_FUNCTIONS), None)
-    if place is None:
+    sign_index = next((at for at, token in enumerate(tokens) if token in _COMPARISON_FUNCTIONS), None)
+    if sign_index is None:
         return None
-    number = code.number(tokens[place + 1 :])
-    channel = _find_channel(code, tokens[:place])
-    return None if number is None or channel is None else (join_tokens(tokens[:place]), tokens[place], number, channel)
+    number = code.number(tokens[sign_index + 1 :])
+    channel = _find_channel(code, tokens[:sign_index])
+    return (
+        None
+        if number is None or channel is None
+        else (join_tokens(tokens[:sign_index]), tokens[sign_index], number, channel)
+    )
 
 
 def _find_channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
@@ -181,13 +194,13 @@ def _find_channel(code: CodeStatements, tokens: Sequence[str]) -> int | None:
     name = tokens[-1]
     if len(tokens) > 1:
         return _CHANNELS.index(name) if name in _CHANNELS else None
-    for each in code.statements:
-        if each.tokens[-1:] == ("rgb",) and "=" in each.tokens and len(each.tokens) > 6:
-            targets = [token for token in each.tokens[: each.tokens.index("=")] if is_name(token)]
+    for statement in code.statements:
+        if statement.tokens[-1:] == ("rgb",) and "=" in statement.tokens and len(statement.tokens) > 6:
+            targets = [token for token in statement.tokens[: statement.tokens.index("=")] if is_name(token)]
             if name in targets and len(targets) == 3:
                 return targets.index(name)
-        if each.target == name and each.tokens[-1] in _CHANNELS:
-            return _CHANNELS.index(each.tokens[-1])
+        if statement.target == name and statement.tokens[-1] in _CHANNELS:
+            return _CHANNELS.index(statement.tokens[-1])
     return None
 
 

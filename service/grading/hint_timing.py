@@ -26,13 +26,13 @@ def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say`` without ``wait=True``, if the text must be spoken to its end."""
     if not any(_SPEAKING in each.message for each in clues.results) or not _has_lost_criterion(clues, WordSequence):
         return
-    for listing, each in collect_statements(clues):
-        for call in each.calls:
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
             if call.name == "say" and call.arguments and not any("wait" in one for one in call.arguments):
-                said = format_arguments(call.arguments)
+                arguments = format_arguments(call.arguments)
                 yield (
-                    f"{listing.locate(each.line)}: the program goes on before the words are spoken. "
-                    f"Write say({said}, wait=True)"
+                    f"{listing.locate(statement.line)}: the program goes on before the words are spoken. "
+                    f"Write say({arguments}, wait=True)"
                 )
                 return
 
@@ -41,13 +41,13 @@ def hint_about_short_waits(clues: Clues) -> Iterator[str]:
     """Yield a hint on a wait for an answer that is shorter than the answer takes."""
     if not _has_lost_criterion(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
         return
-    takes = _measure_fastest_answer(clues)
-    for listing, each in collect_statements(clues):
-        number = _find_sleep_seconds(listing, each)
-        if number is not None and number < takes and listing.code.list_enclosing_loops(each):
+    answer_seconds = _measure_fastest_answer(clues)
+    for listing, statement in collect_statements(clues):
+        number = _find_sleep_seconds(listing, statement)
+        if number is not None and number < answer_seconds and listing.code.list_enclosing_loops(statement):
             yield (
-                f"{listing.locate(each.line)} waits {number:g} s, but an answer takes {takes:.2g} s. "
-                f"Wait longer, for example {max(0.5, math.ceil(20 * takes) / 10):g} s"
+                f"{listing.locate(statement.line)} waits {number:g} s, but an answer takes {answer_seconds:.2g} s. "
+                f"Wait longer, for example {max(0.5, math.ceil(20 * answer_seconds) / 10):g} s"
             )
             return
 
@@ -56,18 +56,19 @@ def hint_about_rare_readings(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that reads a sensor so rarely that the robot drives past its target."""
     if not _has_lost_criterion(clues, *STOPPING_CRITERIA) or clues.is_stationary:
         return
-    for listing, each in collect_statements(clues):
-        number = _find_sleep_seconds(listing, each)
-        loop = next((one for one in listing.code.list_enclosing_loops(each) if one.keyword == "while"), None)
+    for listing, statement in collect_statements(clues):
+        number = _find_sleep_seconds(listing, statement)
+        loop = next((one for one in listing.code.list_enclosing_loops(statement) if one.keyword == "while"), None)
         if number is None or number < _RARE_READING_SECONDS or loop is None:
             continue
         body = listing.code.list_body(loop)
-        reads = any(token in PROPERTIES for one in (loop, *body) for token in one.tokens)
-        if reads and each.parent == loop.number:
-            way = _measure_top_speed(clues) * number
+        has_reading = any(token in PROPERTIES for one in (loop, *body) for token in one.tokens)
+        if has_reading and statement.parent == loop.number:
+            distance = _measure_top_speed(clues) * number
             yield (
-                f"{listing.locate(each.line)}: the loop reads the sensor only every {number:g} s, and the robot drives "
-                f"about {way:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
+                f"{listing.locate(statement.line)}: the loop reads the sensor only every {number:g} s, and the "
+                "robot drives "
+                f"about {distance:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
             )
             return
 
@@ -84,20 +85,20 @@ def _find_sleep_seconds(listing: Listing, statement: Statement) -> float | None:
 
 def _measure_fastest_answer(clues: Clues) -> float:
     """Return the shortest time from a message to its answer, in seconds; 0 if there are no answers."""
-    took = (
+    answer_times = (
         message.delivered - recording.messages[message.reply_to].t
         for recording in clues.recordings
         for message in recording.messages
         if message.reply_to is not None and message.delivered is not None and message.sender == "responder"
     )
-    return min(took, default=0.0)
+    return min(answer_times, default=0.0)
 
 
 def _measure_top_speed(clues: Clues) -> float:
     """Return the highest mean speed of a trial, in mm/s."""
-    found = [0.0]
+    speeds = [0.0]
     for recording in clues.recordings:
         xs, ys = recording.ticks.x, recording.ticks.y
-        way = sum(math.hypot(b - a, d - c) for a, b, c, d in zip(xs, xs[1:], ys, ys[1:], strict=False))
-        found.append(float(way) / recording.end_t if recording.end_t else 0.0)
-    return max(found)
+        distance = sum(math.hypot(b - a, d - c) for a, b, c, d in zip(xs, xs[1:], ys, ys[1:], strict=False))
+        speeds.append(float(distance) / recording.end_t if recording.end_t else 0.0)
+    return max(speeds)

@@ -33,12 +33,12 @@ _Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
 
 def hint_about_unused_value(clues: Clues) -> Iterator[str]:
     """Yield a hint on a value that is computed but never used."""
-    for listing, each in collect_statements(clues):
-        name, value = each.target, each.tokens[2:]
-        computes = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
-        if computes and not any(_is_name_used(one, name) for one in listing.code.statements):
+    for listing, statement in collect_statements(clues):
+        name, value = statement.target, statement.tokens[2:]
+        is_computed = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
+        if is_computed and not any(_is_name_used(one, name) for one in listing.code.statements):
             yield (
-                f"{listing.locate(each.line)} computes {name}, but no line uses it. Write {name} where its value "
+                f"{listing.locate(statement.line)} computes {name}, but no line uses it. Write {name} where its value "
                 "is needed"
             )
             return
@@ -54,39 +54,44 @@ def hint_about_swapped_ports(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``MoveTank(OUTPUT_C, OUTPUT_B)``: the left motor, on B, must come first."""
     if not any(isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost):
         return
-    found = [(listing, each, call.name) for listing, each in collect_statements(clues) for call in each.calls]
-    swapped = [
+    calls = [(listing, each, call.name) for listing, each in collect_statements(clues) for call in each.calls]
+    swapped_calls = [
         (listing, each, name)
-        for listing, each, name in found
+        for listing, each, name in calls
         if name.rpartition(".")[2] in _PAIRS and "".join(_SWAPPED_PORTS) in "".join(each.tokens)
     ]
-    if swapped:
-        listing, each, name = swapped[0]
-        others = [one.line for _, one, _ in swapped[1:]]
-        more = f" Line {others[0]} has the same." if others else ""
+    if swapped_calls:
+        listing, statement, name = swapped_calls[0]
+        other_lines = [one.line for _, one, _ in swapped_calls[1:]]
+        lines_sentence = f" Line {other_lines[0]} has the same." if other_lines else ""
         yield (
-            f"{listing.locate(each.line)} takes OUTPUT_C for the left motor, so the robot turns to the other side: the "
-            f"left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{more}"
+            f"{listing.locate(statement.line)} takes OUTPUT_C for the left motor, so the robot turns to the other "
+            "side: the "
+            f"left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{lines_sentence}"
         )
 
 
 def hint_about_swallowed_flags(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``-oAHWR``: the flag takes a value, so the flags after it become its value."""
-    told = [each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source_rule(one)]
-    missing = {flag for message in told for flag in _MISSING_FLAG.findall(message)}
-    for listing in clues.programs if missing else ():
-        place = listing.magic_place
-        found = _VALUED_FLAG.search(listing.lines[place]) if place is not None else None
-        if place is None or found is None or not missing & set(found[3]):
+    messages = [
+        each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source_rule(one)
+    ]
+    missing_flags = {flag for message in messages for flag in _MISSING_FLAG.findall(message)}
+    for listing in clues.programs if missing_flags else ():
+        magic_index = listing.magic_place
+        match = _VALUED_FLAG.search(listing.lines[magic_index]) if magic_index is not None else None
+        if magic_index is None or match is None or not missing_flags & set(match[3]):
             continue
-        before, flag, value = found.groups()
-        other = flag.swapcase()
-        better = (
-            f"-{before}{other}{value}" if other in missing else f"-{before}{value}, and -{flag} with its value apart"
+        leading_flags, flag, value = match.groups()
+        other_flag = flag.swapcase()
+        advice = (
+            f"-{leading_flags}{other_flag}{value}"
+            if other_flag in missing_flags
+            else f"-{leading_flags}{value}, and -{flag} with its value apart"
         )
         yield (
-            f"{listing.locate(place + 1)}: -{flag} takes a value, so {value} is its value and sets no flags. "
-            f"Write {better}"
+            f"{listing.locate(magic_index + 1)}: -{flag} takes a value, so {value} is its value and sets no flags. "
+            f"Write {advice}"
         )
         return
 
@@ -98,18 +103,19 @@ def _is_source_rule(criterion: object) -> bool:
 def hint_about_few_samples(clues: Clues) -> Iterator[str]:
     """Yield a hint on a log with too few samples, which may explain its other errors."""
     # A robot that stopped too early could not log enough.
-    stopped = any(isinstance(each, StopOn) for each in clues.lost)
-    for criterion in () if stopped else clues.lost:
-        told = next((each.message for each in clues.results if each.id == criterion.id), "")
-        found = _TOO_FEW_SAMPLES.search(told) if isinstance(criterion, Datalog) else None
-        if found is None or found[2] == "0":
+    has_stopping_criterion = any(isinstance(each, StopOn) for each in clues.lost)
+    for criterion in () if has_stopping_criterion else clues.lost:
+        message = next((each.message for each in clues.results if each.id == criterion.id), "")
+        match = _TOO_FEW_SAMPLES.search(message) if isinstance(criterion, Datalog) else None
+        if match is None or match[2] == "0":
             continue
-        few = f"only {found[2]} samples were logged, and at least {found[1]} are asked for"
-        sleeping = _collect_sleeping_loops(clues)
-        if len(sleeping) == 1:
-            listing, each, seconds = sleeping[0]
+        sentence = f"only {match[2]} samples were logged, and at least {match[1]} are asked for"
+        sleeping_loops = _collect_sleeping_loops(clues)
+        if len(sleeping_loops) == 1:
+            listing, statement, seconds = sleeping_loops[0]
             yield (
-                f"{listing.locate(each.line)}: {few}. The loop waits {seconds:g} s after each of them: wait less, "
+                f"{listing.locate(statement.line)}: {sentence}. The loop waits {seconds:g} s after each of them: "
+                "wait less, "
                 "and let "
                 "the loop repeat more often"
             )
@@ -118,36 +124,36 @@ def hint_about_few_samples(clues: Clues) -> Iterator[str]:
 
 def _collect_sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, float]]:
     """Return the statements that sleep in a printing loop, with their seconds."""
-    found = []
-    for listing, each in collect_statements(clues):
-        call = next((one for one in each.calls if one.name in ("time.sleep", "sleep")), None)
+    sleeping_loops = []
+    for listing, statement in collect_statements(clues):
+        call = next((one for one in statement.calls if one.name in ("time.sleep", "sleep")), None)
         seconds = listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
-        loops = listing.code.list_enclosing_loops(each)
+        loops = listing.code.list_enclosing_loops(statement)
         if (
             seconds
             and loops
             and any(one.name == "print" for other in listing.code.list_body(loops[0]) for one in other.calls)
         ):
-            found.append((listing, each, seconds))
-    return found
+            sleeping_loops.append((listing, statement, seconds))
+    return sleeping_loops
 
 
 def hint_about_few_images(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that is too fast to take enough images of its patterns."""
     for criterion in clues.lost:
-        told = next((each.message for each in clues.results if each.id == criterion.id), "")
-        found = _PAIRS_TAKEN.search(told) if isinstance(criterion, Collects) else None
-        driving = [
+        message = next((each.message for each in clues.results if each.id == criterion.id), "")
+        match = _PAIRS_TAKEN.search(message) if isinstance(criterion, Collects) else None
+        drive_statements = [
             (listing, each)
             for listing, each in collect_statements(clues)
             if any(call.name.endswith(".on") and call.arguments for call in each.calls)
         ]
-        if found is None or len(driving) != 1 or clues.seconds > clues.limit / 4:
+        if match is None or len(drive_statements) != 1 or clues.seconds > clues.limit / 4:
             continue
-        listing, each = driving[0]
+        listing, statement = drive_statements[0]
         yield (
-            f"{listing.locate(each.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
-            f"{found[1]} "
+            f"{listing.locate(statement.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
+            f"{match[1]} "
             "pairs of images. Drive slower, or take images more often"
         )
         return
@@ -156,9 +162,9 @@ def hint_about_few_images(clues: Clues) -> Iterator[str]:
 def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that stops when only the edge of its sensor is on the target."""
     for criterion in clues.lost:
-        told = next((each.message for each in clues.results if each.id == criterion.id), "")
-        found = _READING.search(told) if isinstance(criterion, StopOn) else None
-        if found is None or not float(found[2]) < float(found[3]) < 100:
+        message = next((each.message for each in clues.results if each.id == criterion.id), "")
+        match = _READING.search(message) if isinstance(criterion, StopOn) else None
+        if match is None or not float(match[2]) < float(match[3]) < 100:
             continue
         loops = [
             (listing, each)
@@ -166,11 +172,11 @@ def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
             if each.keyword == "while" and any(token in PROPERTIES for token in each.condition)
         ]
         if len(loops) == 1:
-            listing, each = loops[0]
+            listing, statement = loops[0]
             yield (
-                f"{listing.locate(each.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
+                f"{listing.locate(statement.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
                 "it read "
-                f"{found[3]} %, expected {found[1]} to {found[2]} %. Let the robot drive on a little after the loop, "
+                f"{match[3]} %, expected {match[1]} to {match[2]} %. Let the robot drive on a little after the loop, "
                 "for example with time.sleep(0.2)"
             )
             return
@@ -180,15 +186,20 @@ def hint_about_swapped_atan2(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``math.atan2(dx, dy)``, if the robot misses its target."""
     if not any(isinstance(each, DRIVING_CRITERIA + STOPPING_CRITERIA) for each in clues.lost):
         return
-    for listing, each in collect_statements(clues):
-        for call in each.calls:
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
             if call.name.rpartition(".")[2] != "atan2" or len(call.arguments) != 2:
                 continue
-            first, second = ([token for token in one if is_name(token)] for one in call.arguments)
-            if first and second and all(map(_X_NAME.match, first)) and all(map(_Y_NAME.match, second)):
+            first_names, second_names = ([token for token in one if is_name(token)] for one in call.arguments)
+            if (
+                first_names
+                and second_names
+                and all(map(_X_NAME.match, first_names))
+                and all(map(_Y_NAME.match, second_names))
+            ):
                 y, x = join_tokens(call.arguments[1]), join_tokens(call.arguments[0])
                 yield (
-                    f"{listing.locate(each.line)}: atan2 takes y first, and then x. For the angle from the x axis "
+                    f"{listing.locate(statement.line)}: atan2 takes y first, and then x. For the angle from the x axis "
                     "write "
                     f"{call.name}({y}, {x})"
                 )

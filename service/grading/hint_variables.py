@@ -17,16 +17,16 @@ _OTHER_SIDE = {"left": "right", "right": "left", "Left": "Right", "Right": "Left
 def check_name_case(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``Count = count + 1``: an unread name that differs from another only in case."""
     name, tokens = statement.target, statement.tokens
-    meant = next((each for each in tokens[2:] if each != name and each.casefold() == name.casefold()), "")
+    intended_name = next((each for each in tokens[2:] if each != name and each.casefold() == name.casefold()), "")
     statements = listing.code.statements
-    if not name or not is_name(meant) or not any(each.target == meant for each in statements):
+    if not name or not is_name(intended_name) or not any(each.target == intended_name for each in statements):
         return ""
     if any(name in (each.tokens[1:] if each.target == name else each.tokens) for each in statements):
         return ""
     return (
-        f"{listing.locate(statement.line)} assigns {name}, so {meant} stays as it is: upper and lower case are "
+        f"{listing.locate(statement.line)} assigns {name}, so {intended_name} stays as it is: upper and lower case are "
         "different. "
-        f"Write {meant} = {join_tokens(tokens[2:])}"
+        f"Write {intended_name} = {join_tokens(tokens[2:])}"
     )
 
 
@@ -34,20 +34,26 @@ def check_mixed_sides(listing: Listing, statement: Statement) -> str:
     """Return a hint on a name with right in it that is assigned a value from the left, or the reverse."""
     name, value = statement.target, statement.tokens[2:]
     twin = _swap_sides(name)
-    fixed = tuple(_swap_sides(token) if is_name(token) else token for token in value)
+    fixed_tokens = tuple(_swap_sides(token) if is_name(token) else token for token in value)
     sides = {side.lower() for token in value if is_name(token) for side in _SIDE.findall(token)}
-    own = {side.lower() for side in _SIDE.findall(name)}
-    if len(own) != 1 or len(sides) != 1 or own == sides:
+    name_sides = {side.lower() for side in _SIDE.findall(name)}
+    if len(name_sides) != 1 or len(sides) != 1 or name_sides == sides:
         return ""
-    other = next((each for each in listing.code.statements if each.target == twin and each.tokens[2:] == value), None)
-    if other is None:
+    twin_assignment = next(
+        (each for each in listing.code.statements if each.target == twin and each.tokens[2:] == value), None
+    )
+    if twin_assignment is None:
         return ""
-    again = [each.line for each in listing.code.statements if each.target == name and each.tokens[2:] == value]
-    more = "" if len(again) < 2 else f" in lines {', '.join(map(str, again[:-1]))} and {again[-1]}"
+    repeated_lines = [each.line for each in listing.code.statements if each.target == name and each.tokens[2:] == value]
+    lines_clause = (
+        ""
+        if len(repeated_lines) < 2
+        else f" in lines {', '.join(map(str, repeated_lines[:-1]))} and {repeated_lines[-1]}"
+    )
     return (
-        f"{listing.locate(statement.line)} gives {name} the same value as {twin} in line {other.line}: "
+        f"{listing.locate(statement.line)} gives {name} the same value as {twin} in line {twin_assignment.line}: "
         f"{join_tokens(value)}. "
-        f"Write {name} = {join_tokens(fixed)}{more}"
+        f"Write {name} = {join_tokens(fixed_tokens)}{lines_clause}"
     )
 
 
@@ -58,7 +64,7 @@ def check_early_step(listing: Listing, statement: Statement) -> str:
     if loop is None or len(loop.condition) != 6 or loop.condition[1:4] != ("<", "len", "("):
         return ""
     name, items = loop.condition[0], loop.condition[4]
-    place = next(
+    item_index = next(
         (
             at
             for at in range(len(statement.tokens) - 3)
@@ -66,13 +72,13 @@ def check_early_step(listing: Listing, statement: Statement) -> str:
         ),
         None,
     )
-    from_zero = [each for each in code.statements[: loop.number] if each.target == name][-1:]
+    assignments = [each for each in code.statements[: loop.number] if each.target == name][-1:]
     steps = [each for each in code.list_body(loop) if name in each.bound_names]
-    if place is None or not from_zero or from_zero[0].tokens[2:] != ("0",) or len(steps) != 1:
+    if item_index is None or not assignments or assignments[0].tokens[2:] != ("0",) or len(steps) != 1:
         return ""
     step = steps[0]
-    grows = step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1"))
-    if not grows or step.parent != loop.number or step.number >= statement.number:
+    is_increment = step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1"))
+    if not is_increment or step.parent != loop.number or step.number >= statement.number:
         return ""
     return (
         f"{listing.locate(statement.line)}: line {step.line} has already added 1 to {name}, so {items}[{name}] "
@@ -87,8 +93,8 @@ def check_removal_in_loop(listing: Listing, statement: Statement) -> str:
     loop = next((each for each in code.list_enclosing(statement) if each.keyword == "for"), None)
     if loop is None or len(loop.tokens) != 5 or tokens[1:4] != (".", "remove", "(") or tokens[0] != loop.tokens[3]:
         return ""
-    after = code.statements[statement.number + 1 : statement.number + 2]
-    if after and after[0].keyword in ("break", "return") and after[0].parent == statement.parent:
+    following = code.statements[statement.number + 1 : statement.number + 2]
+    if following and following[0].keyword in ("break", "return") and following[0].parent == statement.parent:
         return ""
     name, items = loop.tokens[1], loop.tokens[3]
     return (
@@ -100,24 +106,34 @@ def check_removal_in_loop(listing: Listing, statement: Statement) -> str:
 
 def check_unreachable_if(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``if a < 5 and b < 5`` after an ``if a < 9`` that returns: the second is never true."""
-    code, asked = listing.code, _parse_conjuncts(statement)
+    code, conjuncts = listing.code, _parse_conjuncts(statement)
     in_chain = statement.keyword == "elif"
-    for each in reversed(code.statements[: statement.number]) if asked else ():
-        if each.indent < statement.indent or (each.parent == statement.parent and each.keyword not in ("if", "elif")):
+    for earlier_statement in reversed(code.statements[: statement.number]) if conjuncts else ():
+        if earlier_statement.indent < statement.indent or (
+            earlier_statement.parent == statement.parent and earlier_statement.keyword not in ("if", "elif")
+        ):
             return ""
-        if each.parent != statement.parent:
-            if any(one[0] in each.bound_names for one in asked) and each.keyword not in _EXIT_KEYWORDS:
+        if earlier_statement.parent != statement.parent:
+            if (
+                any(one[0] in earlier_statement.bound_names for one in conjuncts)
+                and earlier_statement.keyword not in _EXIT_KEYWORDS
+            ):
                 return ""
             continue
-        body, earlier = code.list_body(each), _parse_conjuncts(each)
-        leaves = bool(body) and body[-1].parent == each.number and body[-1].keyword in _EXIT_KEYWORDS
-        if (in_chain or leaves) and earlier and all(any(_implies(one, other) for one in asked) for other in earlier):
+        body, earlier_conjuncts = code.list_body(earlier_statement), _parse_conjuncts(earlier_statement)
+        is_exit = bool(body) and body[-1].parent == earlier_statement.number and body[-1].keyword in _EXIT_KEYWORDS
+        if (
+            (in_chain or is_exit)
+            and earlier_conjuncts
+            and all(any(_implies(one, other) for one in conjuncts) for other in earlier_conjuncts)
+        ):
             return (
                 f"{listing.locate(statement.line)} is never true: wherever {join_tokens(statement.condition)}, "
-                f"line {each.line} "
-                f"has already found that {join_tokens(each.condition)}. Move this condition above line {each.line}"
+                f"line {earlier_statement.line} "
+                f"has already found that {join_tokens(earlier_statement.condition)}. Move this condition above "
+                f"line {earlier_statement.line}"
             )
-        in_chain = in_chain and each.keyword == "elif"
+        in_chain = in_chain and earlier_statement.keyword == "elif"
     return ""
 
 
@@ -132,21 +148,25 @@ def _parse_conjuncts(statement: Statement) -> list[_Comparison]:
     parts: list[tuple[str, ...]] = [()]
     for token in statement.condition:
         parts = [*parts, ()] if token == "and" else [*parts[:-1], (*parts[-1], token)]
-    found = [(each[0], each[1], each[2]) for each in parts if len(each) == 3 and is_name(each[0]) and each[1] in _SIGNS]
-    return found if len(found) == len(parts) else []
+    comparisons = [
+        (each[0], each[1], each[2]) for each in parts if len(each) == 3 and is_name(each[0]) and each[1] in _SIGNS
+    ]
+    return comparisons if len(comparisons) == len(parts) else []
 
 
 _SIGNS = frozenset({"<", ">", "<=", ">=", "==", "!="})
 
 
-def _implies(one: _Comparison, other: _Comparison) -> bool:
+def _implies(first: _Comparison, second: _Comparison) -> bool:
     """Return whether the first comparison implies the second: the same, or with a stricter number."""
-    if one == other:
+    if first == second:
         return True
-    if one[:2] != other[:2] or not all(each[2].replace(".", "", 1).isdecimal() for each in (one, other)):
+    if first[:2] != second[:2] or not all(each[2].replace(".", "", 1).isdecimal() for each in (first, second)):
         return False
     return (
-        float(one[2]) <= float(other[2]) if one[1][0] == "<" else one[1][0] == ">" and float(one[2]) >= float(other[2])
+        float(first[2]) <= float(second[2])
+        if first[1][0] == "<"
+        else first[1][0] == ">" and float(first[2]) >= float(second[2])
     )
 
 

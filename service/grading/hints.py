@@ -267,10 +267,10 @@ def collect_hints(
     Raises:
         Exception: Whatever ``collect_within_limits`` raises.
     """
-    shown = [result for result in results if result.visibility == "visible"]
+    visible_results = [result for result in results if result.visibility == "visible"]
     rules = (
         collect_accepted_differences
-        if all(result.marks >= result.max_marks for result in shown)
+        if all(result.marks >= result.max_marks for result in visible_results)
         else _collect_all_hints
     )
     return collect_within_limits(trials, lambda: rules(collect_clues(submission, plan, trials, results)), heartbeat)
@@ -282,25 +282,25 @@ def _collect_all_hints(clues: Clues) -> tuple[str, ...]:
 
 def collect_near_misses(clues: Clues) -> tuple[str, ...]:
     """Return everything that the rules find, regardless of marks. Problems that prevent everything else come first."""
-    explained = _apply_rules(_ERROR_RULES, clues)
-    errors = explained or _apply_rules((hint_about_errors,), clues)
-    sent = _apply_rules(_MESSAGE_RULES, clues)
+    explained_errors = _apply_rules(_ERROR_RULES, clues)
+    errors = explained_errors or _apply_rules((hint_about_errors,), clues)
+    message_hints = _apply_rules(_MESSAGE_RULES, clues)
     slips = () if errors else _apply_rules((hint_about_slips,), clues)
     limits = () if errors or slips else _apply_rules(_LIMIT_RULES, clues)
     structure = () if errors else _apply_rules(_STRUCTURE_RULES, clues)
-    still = () if errors or slips or limits or structure else _apply_rules((hint_about_stillness,), clues)
-    first = (*explained, *sent) if explained else (*sent, *errors)
-    found = (
+    stillness = () if errors or slips or limits or structure else _apply_rules((hint_about_stillness,), clues)
+    leading_hints = (*explained_errors, *message_hints) if explained_errors else (*message_hints, *errors)
+    all_hints = (
         *_apply_rules(_FILE_RULES, clues),
-        *first,
+        *leading_hints,
         *slips,
         *limits,
         *structure,
-        *still,
+        *stillness,
         *_apply_rules(_RESULT_RULES, clues),
     )
-    found = found or next(filter(None, (_apply_rules((rule,), clues) for rule in _FALLBACK_RULES)), ())
-    return tuple(dict.fromkeys(found))[:_MAX_HINTS]
+    all_hints = all_hints or next(filter(None, (_apply_rules((rule,), clues) for rule in _FALLBACK_RULES)), ())
+    return tuple(dict.fromkeys(all_hints))[:_MAX_HINTS]
 
 
 def _apply_rules(rules: Sequence[Rule], clues: Clues) -> tuple[str, ...]:
@@ -329,32 +329,32 @@ def _hint_about_other_words(clues: Clues) -> Iterator[str]:
         ("program", "prints", clues.printed),
         ("responder", "answers", clues.answers),
     )
-    for asked in _QUOTED.findall(_join_task_lines(clues)):
-        begin = asked.partition("...")[0].strip()
-        if len(begin.split()) < 2 or _VARIABLE_TEXT.search(begin):
+    for quotation in _QUOTED.findall(_join_task_lines(clues)):
+        opening = quotation.partition("...")[0].strip()
+        if len(opening.split()) < 2 or _VARIABLE_TEXT.search(opening):
             continue
-        wanted = ExpectedText(begin, "contains")
-        if any(wanted.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
+        expected = ExpectedText(opening, "contains")
+        if any(expected.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
             continue
-        for part, verb, found in texts:
-            near = next((text for text in found if is_near(wanted, text)), None)
-            if near is not None:
-                where = describe_quoting_line(clues, part, near)
-                yield f"{where} {verb} {quote_text(near)}; the assignment asks for {quote_text(begin)}"
+        for part, verb, part_texts in texts:
+            similar_text = next((text for text in part_texts if is_near(expected, text)), None)
+            if similar_text is not None:
+                location = describe_quoting_line(clues, part, similar_text)
+                yield f"{location} {verb} {quote_text(similar_text)}; the assignment asks for {quote_text(opening)}"
                 return
 
 
 def _hint_about_missing_keys(clues: Clues) -> Iterator[str]:
-    asked = list(
+    required_keys = list(
         dict.fromkeys(key for form in _extract_json_objects(_join_task_lines(clues)) for key in _KEY.findall(form))
     )
     answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < LONGEST_TEXT]
-    given = {key for text in answers for key in _KEY.findall(text)}
-    missing = [key for key in asked if key not in given]
-    if missing and given:
-        where = describe_return_line(answers[0], clues, RETURN_LINE)
-        keys = " and ".join(map(quote_text, missing[:3]))
-        yield f"{where}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
+    answer_keys = {key for text in answers for key in _KEY.findall(text)}
+    missing_keys = [key for key in required_keys if key not in answer_keys]
+    if missing_keys and answer_keys:
+        location = describe_return_line(answers[0], clues, RETURN_LINE)
+        keys = " and ".join(map(quote_text, missing_keys[:3]))
+        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
 
 
 def _join_task_lines(clues: Clues) -> str:
@@ -365,8 +365,8 @@ def _extract_json_objects(task: str) -> Iterator[str]:
     """Yield each object after ``JSON::``, up to its closing bracket."""
     for piece in task.split(JSON)[1:]:
         depth = 0
-        for place, letter in enumerate(piece):
+        for index, letter in enumerate(piece):
             depth += (letter == "{") - (letter == "}")
             if depth == 0:
-                yield piece[: place + 1]
+                yield piece[: index + 1]
                 break

@@ -43,51 +43,55 @@ def add_model_answers(
     trainer = plan.functions
     if trainer is None or not results:
         return results
-    learnt = [
+    training_pairs = [
         pair for result in results if result.scenario in training.scenarios for pair in _collect_trial_pairs(result)
     ]
-    known = [(pair, pair.truth) for pair in learnt if pair.truth is not None]
-    asked = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
+    labelled_pairs = [(pair, pair.truth) for pair in training_pairs if pair.truth is not None]
+    test_indices = [index for index, result in enumerate(results) if result.scenario not in training.scenarios]
     # Hidden images come last, so that feedback on visible ones is fixed before the model sees hidden ones.
-    visible = [index for index in asked if results[index].visibility == "visible"]
-    groups = [group for group in (visible, [index for index in asked if index not in visible]) if group]
-    unseen = [[pair for index in group for pair in _collect_trial_pairs(results[index])] for group in groups]
+    visible = [index for index in test_indices if results[index].visibility == "visible"]
+    groups = [group for group in (visible, [index for index in test_indices if index not in visible]) if group]
+    images_by_group = [[pair for index in group for pair in _collect_trial_pairs(results[index])] for group in groups]
     # Not in track order, where neighbours mostly show the same label.
     chance = RandomStream(plan.child_seed, "order of images")
-    orders = [sorted(range(len(images)), key=chance.integer) for images in unseen]
-    if known:
+    orders = [sorted(range(len(images)), key=chance.integer) for images in images_by_group]
+    if labelled_pairs:
         spec = TrainingSpec(
             trainer.code,
             trainer.files,
             training.function,
-            _stack_images([pair for pair, _ in known], training),
-            [truth for _, truth in known],
+            _stack_images([pair for pair, _ in labelled_pairs], training),
+            [truth for _, truth in labelled_pairs],
             [
                 _stack_images([images[place] for place in order], training)
-                for images, order in zip(unseen, orders, strict=True)
+                for images, order in zip(images_by_group, orders, strict=True)
             ],
             trainer.limits,
             trainer.output_bytes,
             plan.child_seed,
         )
-        named = runner.train(spec, meter)
+        predictions = runner.train(spec, meter)
     else:
-        fault = _build_no_images_fault(len(learnt), plan)
-        named = tuple(Predictions((None,) * len(images), fault, "") for images in unseen)
-    answered = list(results)
-    for group, order, gave in zip(groups, orders, named, strict=True):
-        by_place = dict(zip(order, gave.names, strict=True))
-        names = iter([by_place[place] for place in range(len(order))])
+        fault = _build_no_images_fault(len(training_pairs), plan)
+        predictions = tuple(Predictions((None,) * len(images), fault, "") for images in images_by_group)
+    answered_results = list(results)
+    for group, order, group_predictions in zip(groups, orders, predictions, strict=True):
+        names_by_place = dict(zip(order, group_predictions.names, strict=True))
+        names = iter([names_by_place[place] for place in range(len(order))])
         for index in group:
-            recording = _add_answers(results[index].recording, _collect_trial_pairs(results[index]), names, gave)
-            answered[index] = replace(results[index], recording=recording)
-    return answered
+            recording = _add_answers(
+                results[index].recording, _collect_trial_pairs(results[index]), names, group_predictions
+            )
+            answered_results[index] = replace(results[index], recording=recording)
+    return answered_results
 
 
 def _build_no_images_fault(images: int, plan: RunPlan) -> Fault:
     """Return the fault of a run without training images. It is the student's only if the program is theirs."""
-    collected = "collected no images" if not images else f"collected {images} images, but none over a known label"
-    sentence = f"the robot {collected}, so there is nothing to train on"
+    collection_clause = (
+        "collected no images" if not images else f"collected {images} images, but none over a known label"
+    )
+    sentence = f"the robot {collection_clause}, so there is nothing to train on"
     if plan.assignment.parts.program != "student":
         return Fault(0.0, Verdict.ASSIGNMENT_ERROR, "assignment", sentence)
     return Fault(0.0, Verdict.PROGRAM_ERROR, "program", sentence, hint=_COLLECT)
@@ -95,44 +99,44 @@ def _build_no_images_fault(images: int, plan: RunPlan) -> Fault:
 
 def _collect_trial_pairs(result: TrialResult) -> list[ImagePair]:
     """Return a trial's images, logged and sent, in the order in which they were taken."""
-    found = [*collect_pairs(result.recording, "log"), *collect_pairs(result.recording, "sent")]
-    return sorted(found, key=lambda pair: pair.image.tick)
+    pairs = [*collect_pairs(result.recording, "log"), *collect_pairs(result.recording, "sent")]
+    return sorted(pairs, key=lambda pair: pair.image.tick)
 
 
-def _stack_images(found: Sequence[ImagePair], training: Training) -> Images:
+def _stack_images(pairs: Sequence[ImagePair], training: Training) -> Images:
     side = _SIDE[training.image]
-    images = [convert_to_grey(pair.image, focus=training.image == "focus") for pair in found]
+    images = [convert_to_grey(pair.image, focus=training.image == "focus") for pair in pairs]
     return np.stack(images) if images else np.empty((0, side, side), np.uint8)
 
 
 def _add_answers(
-    recording: Recording, asked: Sequence[ImagePair], names: Iterator[str | None], gave: Predictions
+    recording: Recording, pairs: Sequence[ImagePair], names: Iterator[str | None], predictions: Predictions
 ) -> Recording:
     """Return the recording with each image as a message from the robot and each name as its answer."""
     messages: list[Message] = []
     images: list[Image] = []
-    given: list[str | None] = []
-    for pair in asked:
+    answer_names: list[str | None] = []
+    for pair in pairs:
         image, name = pair.image, next(names)
         images.append(replace(image, message=len(messages), truth=pair.truth))
         messages.append(Message(image.t, "robot", "IMG_DATA", image.t))
-        given.append(name)
+        answer_names.append(name)
         if name is not None:
             messages.append(Message(image.t, "responder", name, image.t, len(messages) - 1))
     faults = recording.faults
-    if gave.fault is not None:
-        fault = replace(gave.fault, t=0.0, hint=gave.fault.hint or _HINT)
+    if predictions.fault is not None:
+        fault = replace(predictions.fault, t=0.0, hint=predictions.fault.hint or _HINT)
         faults = tuple(sorted((*faults, fault), key=_get_fault_time))
-    proof = f"{recording.sha256}:{json.dumps([given, str(gave.fault)])}"
+    hash_input = f"{recording.sha256}:{json.dumps([answer_names, str(predictions.fault)])}"
     return replace(
         recording,
         messages=tuple(messages),
         images=tuple(images),
         faults=faults,
         verdict=faults[0].verdict if faults else Verdict.FINISHED,
-        responder_output=gave.output,
-        notes=(*recording.notes, *gave.notes),
-        sha256=hashlib.sha256(proof.encode()).hexdigest(),
+        responder_output=predictions.output,
+        notes=(*recording.notes, *predictions.notes),
+        sha256=hashlib.sha256(hash_input.encode()).hexdigest(),
     )
 
 

@@ -58,13 +58,13 @@ class NotebookRuns:
     """Follows the magics of one notebook execution, in call order."""
 
     def __init__(
-        self, marked: RunSite | None, marked_run: MarkedRunPlanner, unmarked: UnmarkedRuns, last: PlannedRun
+        self, site: RunSite | None, marked_run: MarkedRunPlanner, unmarked_runs: UnmarkedRuns, last_run: PlannedRun
     ) -> None:
-        """Create the planner. ``marked`` is where the marked run starts, ``last`` the run after all cells, if any."""
-        self._marked = marked
+        """Create the planner. ``site`` is where the marked run starts, ``last_run`` the run after all cells, if any."""
+        self._marked = site
         self._marked_run = marked_run
-        self._unmarked = unmarked
-        self._last = last
+        self._unmarked = unmarked_runs
+        self._last = last_run
         self.simulator = SimulatorPage()
         self._program: LoadedProgram | None = None
         self._count = 0
@@ -79,15 +79,15 @@ class NotebookRuns:
 
     def plan_call(self, call: MagicCall) -> PlannedRun:
         """Return the run that one magic starts."""
-        here = RunSite(call.cell, call.line or 0)
-        marked = here == self._marked and not self.marked_ran
+        site = RunSite(call.cell, call.line or 0)
+        is_marked = site == self._marked and not self.marked_ran
         try:
             flags = parse_flags(call.name, call.arguments)
         except UsageError as error:
-            if not (marked and call.body is not None):
+            if not (is_marked and call.body is not None):
                 return PlannedRun(notes=(f"{error}; nothing was run",))
             return self._plan_run(
-                here, marked, *self._load_program(call, Flags()), (f"the magic line is ignored: {error}",)
+                site, is_marked, *self._load_program(call, Flags()), (f"the magic line is ignored: {error}",)
             )
         if call.body is None and call.name != "sim_magic":
             return PlannedRun(notes=(f"%{call.name} in a single line does nothing, as in the simulator",))
@@ -99,14 +99,14 @@ class NotebookRuns:
         try:
             setup = self.simulator.apply(flags)
         except UsageError as error:
-            if not marked:
+            if not is_marked:
                 return PlannedRun(notes=(f"{error}; nothing was run",))
             return self._plan_run(
-                here, marked, Flags(), self.simulator.apply(Flags()), (f"a flag is ignored: {error}",)
+                site, is_marked, Flags(), self.simulator.apply(Flags()), (f"a flag is ignored: {error}",)
             )
-        if not marked and "R" not in flags.switches:
+        if not is_marked and "R" not in flags.switches:
             return PlannedRun(notes=setup.notes)
-        return self._plan_run(here, marked, flags, setup, ())
+        return self._plan_run(site, is_marked, flags, setup, ())
 
     def record_run(self, recording: Recording) -> None:
         """Keep the robot at the end pose of the run."""
@@ -122,21 +122,21 @@ class NotebookRuns:
         return flags, self.simulator.apply(Flags())
 
     def _plan_run(
-        self, here: RunSite, marked: bool, flags: Flags, setup: SimulatorSettings, notes: tuple[str, ...]
+        self, site: RunSite, is_marked: bool, flags: Flags, setup: SimulatorSettings, notes: tuple[str, ...]
     ) -> PlannedRun:
         if self._program is None:
             return PlannedRun(notes=("no robot program has been loaded; nothing was run",))
-        self.started.append(here)
-        if marked:
+        self.started.append(site)
+        if is_marked:
             self.marked_ran = True
-            planned = self._marked_run(self._program, flags, setup)
+            planned_run = self._marked_run(self._program, flags, setup)
             return PlannedRun(
-                planned.spec,
-                planned.obstacles,
+                planned_run.spec,
+                planned_run.obstacles,
                 self._program.cell,
                 True,
-                planned.needs_responder,
-                notes + planned.notes,
+                planned_run.needs_responder,
+                notes + planned_run.notes,
             )
         self._count += 1
         return PlannedRun(
@@ -148,22 +148,22 @@ class NotebookRuns:
 
     def _build_unmarked_spec(self, program: LoadedProgram, setup: SimulatorSettings) -> TrialSpec:
         """Return the spec of an unmarked run, by its own flags."""
-        own = self._unmarked
-        seed = RandomStream(own.seed, "notebook run").integer(self._count) >> 1
+        settings = self._unmarked
+        seed = RandomStream(settings.seed, "notebook run").integer(self._count) >> 1
         return TrialSpec(
-            program=build_program_spec(program, own.limits, own.output_bytes, own.files),
+            program=build_program_spec(program, settings.limits, settings.output_bytes, settings.files),
             responder=None,
             collaborative=setup.collaborative,
-            floor=build_floor(setup.background, seed=own.sheet),
+            floor=build_floor(setup.background, seed=settings.sheet),
             robot=get_robot(setup.robot),
             pose=setup.pose,
             noise=Noise(setup.light_noise, setup.motor_noise),
             channel=Channel(),
-            seconds=own.seconds,
+            seconds=settings.seconds,
             seed=seed,
             child_seed=seed,
             pen_down=setup.pen_down,
-            tick=own.tick,
+            tick=settings.tick,
             records_lines=False,
         )
 

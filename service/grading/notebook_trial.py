@@ -44,33 +44,33 @@ class NotebookTrial:
             Exception: Whatever the meter's heartbeat raises.
         """
         site = self.choice.site if self.choice is not None else None
-        executed, started = self._execute_notebook(spec, obstacles, site, runner, meter)
-        instead = self._choose_replacement(started) if executed.marked_run is None else None
-        if instead is not None:
+        execution, started_sites = self._execute_notebook(spec, obstacles, site, runner, meter)
+        replacement = self._choose_replacement(started_sites) if execution.marked_run is None else None
+        if replacement is not None:
             assert site is not None
-            never = f"the run of cell {site.cell} never started, so the run of cell {instead.cell} is marked"
-            executed, _ = self._execute_notebook(spec, obstacles, instead, runner, meter)
-            executed = replace(executed, notes=(never, *executed.notes))
-            site = instead
-        if executed.marked_run is None:
-            return executed.add_notebook_output(
+            note = f"the run of cell {site.cell} never started, so the run of cell {replacement.cell} is marked"
+            execution, _ = self._execute_notebook(spec, obstacles, replacement, runner, meter)
+            execution = replace(execution, notes=(note, *execution.notes))
+            site = replacement
+        if execution.marked_run is None:
+            return execution.add_notebook_output(
                 runner.build_unstarted_recording(
-                    spec, obstacles, _explain_unstarted_run(executed, site), executed.sandbox
+                    spec, obstacles, _explain_unstarted_run(execution, site), execution.sandbox
                 )
             )
-        recording = executed.marked_run.recording
+        recording = execution.marked_run.recording
         faults = recording.faults
-        if executed.stopped is not None and not any(fault.who == "responder" for fault in faults):
+        if execution.stopped is not None and not any(fault.who == "responder" for fault in faults):
             # The notebook was stopped in a cell, before or after this run.
-            faults = (*faults, replace(executed.stopped, t=recording.end_t))
+            faults = (*faults, replace(execution.stopped, t=recording.end_t))
         verdict = faults[0].verdict if faults else Verdict.FINISHED
-        return executed.add_notebook_output(replace(recording, faults=faults, verdict=verdict))
+        return execution.add_notebook_output(replace(recording, faults=faults, verdict=verdict))
 
-    def _choose_replacement(self, started: Sequence[RunSite]) -> RunSite | None:
+    def _choose_replacement(self, started_sites: Sequence[RunSite]) -> RunSite | None:
         """Return the run to mark if the marked run never started; None if there is no replacement."""
-        if self.choice is None or self.choice.only or not started:
+        if self.choice is None or self.choice.only or not started_sites:
             return None
-        return next((site for site in self.choice.others if site in started), started[-1])
+        return next((site for site in self.choice.others if site in started_sites), started_sites[-1])
 
     def collect_shared_notes(self, results: Sequence[TrialResult]) -> tuple[str, ...]:
         """Return the notes on the cells once for all trials, since they are almost equal.
@@ -88,9 +88,9 @@ class NotebookTrial:
         meter: JobMeter,
     ) -> tuple[ExecutedNotebook, list[RunSite]]:
         """Execute the notebook with the run at ``site`` marked. Return the result and the sites of the runs."""
-        planned = PlannedRun(spec, obstacles, None, True, True)
+        planned_run = PlannedRun(spec, obstacles, None, True, True)
 
-        def marked_run(program: LoadedProgram, flags: Flags, setup: SimulatorSettings) -> PlannedRun:
+        def plan_marked_run(program: LoadedProgram, flags: Flags, setup: SimulatorSettings) -> PlannedRun:
             if self.runs_spec_text:
                 program = replace(program, text=spec.program.code.text)
             run = replace(
@@ -100,35 +100,37 @@ class NotebookTrial:
                 ),
                 pen_down="p" in flags.switches or "p" in program.flags.switches,
             )
-            return replace(planned, spec=run)
+            return replace(planned_run, spec=run)
 
         # Use the usual sheet, unless it is the marked one without its patches, which would reveal the answers.
         sheet = int(spec.floor.sheet == 0 and not spec.floor.label_patches)
         # Noise with the world's seed would identify the trial.
         limits, files = spec.program.limits, self.notebook.files
-        output = spec.program.output_bytes
-        unmarked = UnmarkedRuns(limits, output, spec.seconds, spec.child_seed, files, spec.tick, sheet)
+        output_bytes = spec.program.output_bytes
+        unmarked_runs = UnmarkedRuns(limits, output_bytes, spec.seconds, spec.child_seed, files, spec.tick, sheet)
         notebook = replace(self.notebook, seed=spec.child_seed, agents=spec.agents)
 
         def execute() -> tuple[ExecutedNotebook, list[RunSite]]:
-            planner = NotebookRuns(site, marked_run, unmarked, planned if self.choice is None else PlannedRun())
+            planner = NotebookRuns(
+                site, plan_marked_run, unmarked_runs, planned_run if self.choice is None else PlannedRun()
+            )
             return runner.execute_notebook(notebook, planner, meter), planner.started
 
         return runner.run_with_retries(execute, meter)
 
 
-def _explain_unstarted_run(executed: ExecutedNotebook, site: RunSite | None) -> Fault:
+def _explain_unstarted_run(execution: ExecutedNotebook, site: RunSite | None) -> Fault:
     """Return why the marked run never started: the notebook was stopped, its cell failed, or was never reached.
 
     It counts as a fault of the program, which did not run.
     """
-    never = f"The robot program of cell {site.cell} is marked, but it never ran." if site is not None else ""
-    failed = next((fault for fault in executed.raised if site is not None and fault.cell == site.cell), None)
-    cause = executed.stopped or failed
+    explanation = f"The robot program of cell {site.cell} is marked, but it never ran." if site is not None else ""
+    cell_fault = next((fault for fault in execution.raised if site is not None and fault.cell == site.cell), None)
+    cause = execution.stopped or cell_fault
     if cause is None:
-        hint = f"In {executed.raised[0].place}: {executed.raised[0].message}" if executed.raised else ""
+        hint = f"In {execution.raised[0].place}: {execution.raised[0].message}" if execution.raised else ""
         cell = site.cell if site is not None else None
-        message = f"{never} No cell of the notebook started it."
+        message = f"{explanation} No cell of the notebook started it."
         return Fault(0.0, Verdict.PROGRAM_ERROR, "program", message, cell=cell, hint=hint)
     verdict = Verdict.PROGRAM_ERROR if cause.verdict is Verdict.RESPONDER_ERROR else cause.verdict
-    return replace(cause, who="program", verdict=verdict, hint=never)
+    return replace(cause, who="program", verdict=verdict, hint=explanation)

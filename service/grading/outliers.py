@@ -36,33 +36,33 @@ class Outlier:
     why: Literal["low", "slow", "close"]
 
 
-def find_outliers(found: Sequence[MarksAndTime], pass_share: Decimal) -> tuple[Outlier, ...]:
+def find_outliers(submissions: Sequence[MarksAndTime], pass_share: Decimal) -> tuple[Outlier, ...]:
     """Return the lowest, then the slowest, then those on either side of the pass mark."""
-    return (*_find_lowest(found), *_find_slowest(found), *_find_borderline(found, pass_share))
+    return (*_find_lowest(submissions), *_find_slowest(submissions), *_find_borderline(submissions, pass_share))
 
 
-def _find_lowest(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
-    shares = [float(each.share) for each in found]
-    if len(found) < _MIN_SUBMISSIONS or not (spread := pstdev(shares)):
+def _find_lowest(submissions: Sequence[MarksAndTime]) -> Iterator[Outlier]:
+    shares = [float(each.share) for each in submissions]
+    if len(submissions) < _MIN_SUBMISSIONS or not (spread := pstdev(shares)):
         return
-    below = fmean(shares) - _SPREADS_BELOW * spread
-    for each in sorted(found, key=lambda each: each.share):
-        if each.share < below:
-            yield Outlier(each.id, "low")
+    limit = fmean(shares) - _SPREADS_BELOW * spread
+    for submission in sorted(submissions, key=lambda each: each.share):
+        if submission.share < limit:
+            yield Outlier(submission.id, "low")
 
 
-def _find_slowest(found: Sequence[MarksAndTime]) -> Iterator[Outlier]:
-    times = {each.id: each.seconds for each in found if each.seconds is not None}
+def _find_slowest(submissions: Sequence[MarksAndTime]) -> Iterator[Outlier]:
+    times = {each.id: each.seconds for each in submissions if each.seconds is not None}
     if len(times) < _MIN_SUBMISSIONS:
         return
-    usual = median(times.values())
-    longest = max(_TIMES_SLOWER * usual, usual + _SECONDS_SLOWER)
-    for own, seconds in sorted(times.items(), key=lambda item: -item[1]):
+    median_seconds = median(times.values())
+    longest = max(_TIMES_SLOWER * median_seconds, median_seconds + _SECONDS_SLOWER)
+    for submission_id, seconds in sorted(times.items(), key=lambda item: -item[1]):
         if seconds > longest:
-            yield Outlier(own, "slow")
+            yield Outlier(submission_id, "slow")
 
 
-def _find_borderline(found: Sequence[MarksAndTime], pass_share: Decimal) -> Iterator[Outlier]:
-    for each in sorted(found, key=lambda each: each.share):
-        if abs(each.share - pass_share) <= _CLOSE_SHARE:
-            yield Outlier(each.id, "close")
+def _find_borderline(submissions: Sequence[MarksAndTime], pass_share: Decimal) -> Iterator[Outlier]:
+    for submission in sorted(submissions, key=lambda each: each.share):
+        if abs(submission.share - pass_share) <= _CLOSE_SHARE:
+            yield Outlier(submission.id, "close")

@@ -62,23 +62,23 @@ class RankTable:
 def rank_students(measures: Sequence[StudentMeasures], *, highest: bool) -> tuple[RankRow, ...]:
     """Return the rows in order of place. Equal values share a place: 1, 2, 2, 4."""
     means = {each: round(fmean(each.values), 2) for each in measures if each.values}
-    placed = [
+    ranked_rows = [
         _build_row(
             each, 1 + sum((other > mean) if highest else (other < mean) for other in means.values()), mean, means
         )
         for each, mean in means.items()
     ]
-    without = [RankRow(None, False, each) for each in measures if not each.values]
-    return (*sorted(placed, key=lambda row: (row.place, row.measures.student)), *without)
+    unranked_rows = [RankRow(None, False, each) for each in measures if not each.values]
+    return (*sorted(ranked_rows, key=lambda row: (row.place, row.measures.student)), *unranked_rows)
 
 
 def _build_row(measures: StudentMeasures, place: int, mean: float, means: dict[StudentMeasures, float]) -> RankRow:
-    shared = list(means.values()).count(mean) > 1
+    is_shared = list(means.values()).count(mean) > 1
     count = len(measures.values)
     if count < 2:
-        return RankRow(place, shared, measures, mean)
-    half = _T95[min(count - 1, len(_T95)) - 1] * stdev(measures.values) / math.sqrt(count)
-    return RankRow(place, shared, measures, mean, mean - half, mean + half)
+        return RankRow(place, is_shared, measures, mean)
+    half_width = _T95[min(count - 1, len(_T95)) - 1] * stdev(measures.values) / math.sqrt(count)
+    return RankRow(place, is_shared, measures, mean, mean - half_width, mean + half_width)
 
 
 def _format_row(row: RankRow) -> tuple[str, ...]:

@@ -62,7 +62,7 @@ class ProgramTrial:
 class RunPlan:
     """The participants of every trial, and the code to analyse.
 
-    ``program`` is None if no robot runs; then there are no trials. ``answers`` is the responder, unless ``trial``
+    ``program`` is None if no robot runs; then there are no trials. ``responder`` is the responder, unless ``trial``
     supplies it. ``functions`` is the module whose functions are called. ``read_as`` has the parts in the form for the
     source reader.
     """
@@ -80,7 +80,7 @@ class RunPlan:
     submission: str = ""  # content hash
     missing: Part | None = None  # required, but not submitted
     child_seed: int = 0  # seed of the submission's own chance, shared by all trials
-    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # agents of ``answers``
+    agents: Mapping[str, AgentSpec] = field(default_factory=lambda: MappingProxyType({}))  # agents of ``responder``
     second_program: ProgramSpec | None = None  # if there are two robots
     second_flags: Flags = field(default_factory=Flags)
     executed_statements: Mapping[Part, ExecutedStatements] = field(
@@ -92,16 +92,16 @@ class RunPlan:
     def processes(self) -> tuple[ProgramSpec | ResponderSpec, ...]:
         """The processes that take part in every trial, the slowest to start first."""
         answers = self.trial.notebook.responder_spec if isinstance(self.trial, NotebookTrial) else self.responder
-        found = (answers, *self.agents.values(), self.program, self.second_program)
-        return tuple(each for each in found if each is not None)
+        participants = (answers, *self.agents.values(), self.program, self.second_program)
+        return tuple(each for each in participants if each is not None)
 
     def to_hidden_plan(self) -> RunPlan:
         """Return the plan for hidden trials. Recorded statements could reveal sensor values, so none are recorded."""
-        program, second, answers = self.program, self.second_program, self.responder
+        program, second_program, answers = self.program, self.second_program, self.responder
         return replace(
             self,
             program=program and replace(program, executed_statements=None),
-            second_program=second and replace(second, executed_statements=None),
+            second_program=second_program and replace(second_program, executed_statements=None),
             responder=answers and replace(answers, executed_statements=None),
         )
 
@@ -139,7 +139,7 @@ def _record_statements(plan: RunPlan) -> RunPlan:
     Notebooks and trained models are not watched, and no responder with a function that has only hidden calls. For
     these, reachable code counts.
     """
-    asked = {
+    watched_parts = {
         criterion.part
         for criterion in plan.assignment.criteria
         if isinstance(criterion, SourceRules) and (criterion.uses or criterion.in_loop)
@@ -147,52 +147,59 @@ def _record_statements(plan: RunPlan) -> RunPlan:
     if isinstance(plan.trial, NotebookTrial) or plan.assignment.training is not None:
         return plan
     if _has_hidden_only_function(plan.assignment):
-        asked.discard("responder")
-    ran: dict[Part, ExecutedStatements] = {part: ExecutedStatements() for part in sorted(asked) if part in plan.read_as}
+        watched_parts.discard("responder")
+    statements_by_part: dict[Part, ExecutedStatements] = {
+        part: ExecutedStatements() for part in sorted(watched_parts) if part in plan.read_as
+    }
     program, answers, functions = plan.program, plan.responder, plan.functions
     return replace(
         plan,
-        program=program and replace(program, executed_statements=ran.get("program")),
-        responder=answers and replace(answers, executed_statements=ran.get("responder")),
-        functions=functions and replace(functions, executed_statements=ran.get("responder")),
-        executed_statements=MappingProxyType(ran),
+        program=program and replace(program, executed_statements=statements_by_part.get("program")),
+        responder=answers and replace(answers, executed_statements=statements_by_part.get("responder")),
+        functions=functions and replace(functions, executed_statements=statements_by_part.get("responder")),
+        executed_statements=MappingProxyType(statements_by_part),
     )
 
 
 def _has_hidden_only_function(assignment: Assignment) -> bool:
-    called: dict[bool, set[str]] = {True: set(), False: set()}  # names of functions in hidden and in visible calls
+    names_by_hidden: dict[bool, set[str]] = {
+        True: set(),
+        False: set(),
+    }  # names of functions in hidden and in visible calls
     for criterion in (each for each in assignment.criteria if isinstance(each, Functions)):
         for call in criterion.calls:
-            called[call.hidden].add(call.function or criterion.function)
-    return not called[True] <= called[False]
+            names_by_hidden[call.hidden].add(call.function or criterion.function)
+    return not names_by_hidden[True] <= names_by_hidden[False]
 
 
 def _plan_files(submission: Submission, assignment: Assignment) -> RunPlan:
-    asked, missing = assignment.parts, find_missing_part(submission, assignment.parts)
-    if missing == "program":
-        asked = replace(asked, program="none")
-    elif missing == "responder":
-        asked = replace(asked, responder="none")
-    code = _choose_code("robot program", "robot.py", asked.program, submission.program, assignment)
-    responder = _choose_code("responder", "responder.py", asked.responder, submission.responder, assignment)
+    parts, missing_part = assignment.parts, find_missing_part(submission, assignment.parts)
+    if missing_part == "program":
+        parts = replace(parts, program="none")
+    elif missing_part == "responder":
+        parts = replace(parts, responder="none")
+    code = _choose_code("robot program", "robot.py", parts.program, submission.program, assignment)
+    responder = _choose_code("responder", "responder.py", parts.responder, submission.responder, assignment)
     head = _read_head(code.text, assignment) if code is not None else _ProgramHead(Flags(), "", ())
     notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment uses another one, or none",)
-    files = _collect_files(submission, assignment, asked.program)
+    files = _collect_files(submission, assignment, parts.program)
     program = (
         _build_program_spec(SourceFile(code.name, head.text), head.flags, files, assignment)
         if code is not None
         else None
     )
-    beside = _build_responder_spec(responder, _collect_files(submission, assignment, asked.responder), assignment)
-    plan = _plan_separate_parts(ProgramTrial(), program, head.flags, beside, assignment, notes)
-    if missing == "program" and (asking := _build_question_program(assignment)) is not None:
-        asked_by = "your responder was called by a Robomark program that only sends the texts"
-        plan = replace(plan, program=asking, notes=(*plan.notes, asked_by))
+    responder_spec = _build_responder_spec(
+        responder, _collect_files(submission, assignment, parts.responder), assignment
+    )
+    plan = _plan_separate_parts(ProgramTrial(), program, head.flags, responder_spec, assignment, notes)
+    if missing_part == "program" and (question_program := _build_question_program(assignment)) is not None:
+        note = "your responder was called by a Robomark program that only sends the texts"
+        plan = replace(plan, program=question_program, notes=(*plan.notes, note))
     # Text sent to a missing responder is still a message.
-    collaborative = plan.collaborative or missing == "responder"
-    return replace(plan, missing=missing, collaborative=collaborative, ignored_magic=head.ignored)
+    collaborative = plan.collaborative or missing_part == "responder"
+    return replace(plan, missing=missing_part, collaborative=collaborative, ignored_magic=head.ignored)
 
 
 def _build_question_program(assignment: Assignment) -> ProgramSpec | None:
@@ -206,36 +213,38 @@ def _build_question_program(assignment: Assignment) -> ProgramSpec | None:
 
 def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
     """Plan a notebook: executed if it must answer the robot, otherwise only its marked robot program is used."""
-    asked = assignment.parts
-    if asked.program == "none":
+    parts = assignment.parts
+    if parts.program == "none":
         return _plan_executed_notebook(submission, notebook, assignment, None, Flags(), ())
-    if asked.program != "student":
-        head = _read_head(assignment.given_parts[asked.program], assignment)
+    if parts.program != "student":
+        head = _read_head(assignment.given_parts[parts.program], assignment)
         plan = _plan_executed_notebook(
-            submission, notebook, assignment, SourceFile(asked.program, head.text), head.flags, head.notes
+            submission, notebook, assignment, SourceFile(parts.program, head.text), head.flags, head.notes
         )
         return replace(plan, ignored_magic=head.ignored)
     choice = choose_run(notebook, assignment, submission.run)
     site, cell = choice.site, choice.run.program
     head = _read_head(cell.source if cell is not None else "", assignment)
-    if asked.responder == "student":
+    if parts.responder == "student":
         # Executing the notebook reports an unreadable magic line, and may reach another cell.
         notes = () if head.ignored else head.notes
         if cell is not None:
-            again = "" if site.cell == cell.number else f", because it is run again by cell {site.cell}"
-            marked = f"the robot program in cell {cell.number} of {notebook.name} is marked{again}"
-            notes = (marked, *choice.notes, *notes)
+            rerun_clause = "" if site.cell == cell.number else f", because it is run again by cell {site.cell}"
+            marked_note = f"the robot program in cell {cell.number} of {notebook.name} is marked{rerun_clause}"
+            notes = (marked_note, *choice.notes, *notes)
         return _plan_executed_notebook(
             submission, notebook, assignment, SourceFile(notebook.name, head.text), head.flags, notes, choice
         )
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
-    responder = _choose_code("responder", "responder.py", asked.responder, None, assignment)
-    files = _collect_files(submission, assignment, asked.program)
+    responder = _choose_code("responder", "responder.py", parts.responder, None, assignment)
+    files = _collect_files(submission, assignment, parts.program)
     program = _build_program_spec(SourceFile(f"cell {cell.number}", head.text), head.flags, files, assignment)
-    beside = _build_responder_spec(responder, _collect_files(submission, assignment, asked.responder), assignment)
+    responder_spec = _build_responder_spec(
+        responder, _collect_files(submission, assignment, parts.responder), assignment
+    )
     notes = (*head.notes, f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
-    plan = _plan_separate_parts(ProgramTrial(cell.number), program, head.flags, beside, assignment, notes)
+    plan = _plan_separate_parts(ProgramTrial(cell.number), program, head.flags, responder_spec, assignment, notes)
     return replace(plan, ignored_magic=head.ignored)
 
 
@@ -278,7 +287,7 @@ def _plan_executed_notebook(
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, sources, files, functions.limits, functions.output_bytes, 0)
-    as_read = choice is not None and any(
+    is_text_checked = choice is not None and any(
         isinstance(each, SourceRules) and each.part == "program" for each in assignment.criteria
     )
     read_as: dict[Part, Mapping[str, Any]] = {
@@ -288,7 +297,7 @@ def _plan_executed_notebook(
         read_as["program"] = {"text": program.text}
     return RunPlan(
         assignment,
-        NotebookTrial(spec, choice, as_read),
+        NotebookTrial(spec, choice, is_text_checked),
         _build_program_spec(
             program, flags, _collect_files(submission, assignment, assignment.parts.program), assignment
         )
@@ -306,16 +315,18 @@ def _plan_executed_notebook(
 def _add_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
     """Return the plan with a second robot. Robots without a responder talk to each other."""
     assignment = plan.assignment
-    who = assignment.parts.second_program
+    source = assignment.parts.second_program
     if plan.program is None or isinstance(plan.trial, NotebookTrial):
         raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
-    if who == SAME:
+    if source == SAME:
         return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
-    code = _choose_code("second robot program", SECOND_PROGRAM, who, submission.find_code(SECOND_PROGRAM), assignment)
+    code = _choose_code(
+        "second robot program", SECOND_PROGRAM, source, submission.find_code(SECOND_PROGRAM), assignment
+    )
     assert code is not None
     head = _read_head(code.text, assignment)
     program = _build_program_spec(
-        SourceFile(code.name, head.text), head.flags, _collect_files(submission, assignment, who), assignment
+        SourceFile(code.name, head.text), head.flags, _collect_files(submission, assignment, source), assignment
     )
     return replace(
         plan,
@@ -328,15 +339,15 @@ def _add_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
 
 
 def _choose_code(
-    what: str, usual: str, who: str, submitted: SourceFile | None, assignment: Assignment
+    part_name: str, file_name: str, source: str, submitted_code: SourceFile | None, assignment: Assignment
 ) -> SourceFile | None:
-    if who == "none":
+    if source == "none":
         return None
-    if who != "student":
-        return SourceFile(who, assignment.given_parts[who])
-    if submitted is None:
-        raise UsageError(f"the submission has no {what}; {assignment.id} asks for {usual}")
-    return submitted
+    if source != "student":
+        return SourceFile(source, assignment.given_parts[source])
+    if submitted_code is None:
+        raise UsageError(f"the submission has no {part_name}; {assignment.id} asks for {file_name}")
+    return submitted_code
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,44 +364,44 @@ def _read_head(text: str, assignment: Assignment) -> _ProgramHead:
     """Parse a program's magic line. Notes say where the assignment overrides it."""
     try:
         flags, text = split_program(text)
-        wanted = apply_flags(flags)
+        settings = apply_flags(flags)
     except UsageError as error:
         note = f"the program's magic line is ignored: {error}"
         return _ProgramHead(Flags(), comment_out_magic(text), (note,), str(error))
     world = assignment.world
     notes = []
-    if "b" in flags.values and wanted.background != world.background:
-        asked = flags.values["b"][:40]
-        notes.append(f"the program asks for the background {asked}; the assignment's is {world.background}")
-    if "r" in flags.values and wanted.robot != world.robot:
-        notes.append(f"the program asks for the robot {wanted.robot}; the assignment's is {world.robot}")
+    if "b" in flags.values and settings.background != world.background:
+        background = flags.values["b"][:40]
+        notes.append(f"the program asks for the background {background}; the assignment's is {world.background}")
+    if "r" in flags.values and settings.robot != world.robot:
+        notes.append(f"the program asks for the robot {settings.robot}; the assignment's is {world.robot}")
     if flags.values.keys() & {"N", "M"}:
         notes.append("the assignment's noise is used, not the program's -N or -M")
     return _ProgramHead(flags, text, tuple(notes))
 
 
-def _collect_files(submission: Submission, assignment: Assignment, who: str) -> Mapping[str, bytes]:
-    """Return the files in the folder of a part of ``who``. Submitted files override given ones.
+def _collect_files(submission: Submission, assignment: Assignment, source: str) -> Mapping[str, bytes]:
+    """Return the files in the folder of a part of ``source``. Submitted files override given ones.
 
     Parts from the assignment cannot import the submission's code.
     """
-    submitted = submission.files_without(assignment.parts.agents)
-    own = (each for each in submitted.items() if who == "student" or not each[0].endswith(".py"))
-    return {**assignment.given, **dict(own)}
+    submitted_files = submission.files_without(assignment.parts.agents)
+    own_files = (each for each in submitted_files.items() if source == "student" or not each[0].endswith(".py"))
+    return {**assignment.given, **dict(own_files)}
 
 
 def _plan_agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
     """Plan the agents. Each has a folder and limits like the responder's; given agents see only given files."""
     agents = {}
-    for name, who in assignment.parts.agents.items():
-        given = who != "student"
-        code = SourceFile(who, assignment.given_parts[who]) if given else submission.find_agent_code(name)
+    for name, source in assignment.parts.agents.items():
+        is_given = source != "student"
+        code = SourceFile(source, assignment.given_parts[source]) if is_given else submission.find_agent_code(name)
         spec = _build_responder_spec(
-            code, assignment.given if given else _collect_files(submission, assignment, who), assignment
+            code, assignment.given if is_given else _collect_files(submission, assignment, source), assignment
         )
         if spec is None:
             raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
-        agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=given)
+        agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=is_given)
     return agents
 
 
@@ -398,10 +409,10 @@ def _build_program_spec(
     code: SourceFile, flags: Flags, files: Mapping[str, bytes], assignment: Assignment
 ) -> ProgramSpec:
     limits = assignment.limits
-    allowed = ChildLimits(
+    child_limits = ChildLimits(
         limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _collect_avoided_modules(assignment, "program")
     )
-    return ProgramSpec(code, flags.preamble, allowed, limits.output_bytes, find_modules(code.text, files.get))
+    return ProgramSpec(code, flags.preamble, child_limits, limits.output_bytes, find_modules(code.text, files.get))
 
 
 def _build_responder_spec(
@@ -410,9 +421,9 @@ def _build_responder_spec(
     if code is None:
         return None
     limits = assignment.limits
-    avoided = _collect_avoided_modules(assignment, "responder")
-    allowed = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, avoided)
-    return ResponderSpec(code, files, allowed, limits.output_bytes)
+    avoided_modules = _collect_avoided_modules(assignment, "responder")
+    child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, avoided_modules)
+    return ResponderSpec(code, files, child_limits, limits.output_bytes)
 
 
 def _collect_avoided_modules(assignment: Assignment, part: Part) -> tuple[str, ...]:

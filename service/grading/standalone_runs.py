@@ -121,11 +121,11 @@ def read_runnable(path: Path) -> LoadedNotebook | ProgramFile:
     return LoadedNotebook(read_script(text, path.name)) if is_script(text) else _parse_program(path, text)
 
 
-def load_responder(given: str, limits: RunLimits) -> ResponderSpec:
+def load_responder(argument: str, limits: RunLimits) -> ResponderSpec:
     """Load the responder FILE or FILE:NAME with its neighbouring files. The course's networks are the default."""
-    path, name = Path(given), None
-    if not path.exists() and ":" in given:
-        file, _, name = given.rpartition(":")
+    path, name = Path(argument), None
+    if not path.exists() and ":" in argument:
+        file, _, name = argument.rpartition(":")
         path = Path(file)
     text = _read_source(path)
     return ResponderSpec(
@@ -158,25 +158,27 @@ def run_program(
         UsageError: A flag has an invalid value, or the second program has no start position.
         HostError: The machine failed.
     """
-    wanted = options.flags
+    option_flags = options.flags
     flags = Flags(
-        program.flags.preamble, program.flags.values | wanted.values, program.flags.switches | wanted.switches
+        program.flags.preamble,
+        program.flags.values | option_flags.values,
+        program.flags.switches | option_flags.switches,
     )
     flags = flags if options.floor is None else flags.remove_value("b")
-    chosen = apply_flags(flags)
+    settings = apply_flags(flags)
     spec = replace(
-        _build_trial_spec(_build_program_spec(program, flags, options.limits), chosen, options),
+        _build_trial_spec(_build_program_spec(program, flags, options.limits), settings, options),
         responder=responder,
-        collaborative=chosen.collaborative or responder is not None or second is not None,
+        collaborative=settings.collaborative or responder is not None or second is not None,
         partner=None if second is None else _build_partner_spec(second, options.limits),
     )
     meter = options.limits.create_meter()
-    recording = runner.run(spec, chosen.obstacles, meter)
-    beside = None
+    recording = runner.run(spec, settings.obstacles, meter)
+    other_recording = None
     if over is not None:
-        other = replace(spec, program=_build_program_spec(over, over.flags, options.limits))
-        beside = runner.run(other, chosen.obstacles, meter)
-    return ProgramRun(recording, spec, tuple(chosen.notes), beside)
+        other_spec = replace(spec, program=_build_program_spec(over, over.flags, options.limits))
+        other_recording = runner.run(other_spec, settings.obstacles, meter)
+    return ProgramRun(recording, spec, tuple(settings.notes), other_recording)
 
 
 def run_notebook(
@@ -190,20 +192,22 @@ def run_notebook(
     """
     limits = options.limits
 
-    def last_run(program: LoadedProgram, flags: Flags, own: SimulatorSettings) -> PlannedRun:
-        wanted = planner.simulator.apply(options.flags)
+    def plan_last_run(program: LoadedProgram, flags: Flags, notebook_settings: SimulatorSettings) -> PlannedRun:
+        settings = planner.simulator.apply(options.flags)
         spec = replace(
-            _build_trial_spec(build_program_spec(program, limits.program, limits.output_bytes, files), wanted, options),
-            collaborative=own.collaborative or wanted.collaborative,
-            pen_down=own.pen_down or wanted.pen_down,
+            _build_trial_spec(
+                build_program_spec(program, limits.program, limits.output_bytes, files), settings, options
+            ),
+            collaborative=notebook_settings.collaborative or settings.collaborative,
+            pen_down=notebook_settings.pen_down or settings.pen_down,
         )
-        return PlannedRun(spec, wanted.obstacles, notes=(*own.notes, *wanted.notes))
+        return PlannedRun(spec, settings.obstacles, notes=(*notebook_settings.notes, *settings.notes))
 
     runs = find_runs(notebook)
-    unmarked = UnmarkedRuns(
+    unmarked_runs = UnmarkedRuns(
         limits.program, limits.output_bytes, options.seconds, options.seed, files, options.tick, options.sheet_number
     )
-    planner = NotebookRuns(runs[-1].site if runs else None, last_run, unmarked, PlannedRun())
+    planner = NotebookRuns(runs[-1].site if runs else None, plan_last_run, unmarked_runs, PlannedRun())
     cells = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, cells, files, limits.responder, limits.output_bytes, options.seed)
     return runner.execute_notebook(spec, planner, limits.create_meter())
@@ -213,13 +217,13 @@ def read_neighbour_files(path: Path, text: str) -> dict[str, bytes]:
     """Return the files for a responder or notebook with this text: data, modules, and the course's networks."""
     files = {file: load_weights(model) for file, model in _NETWORKS.items()}
     files |= {f"{name}.py": module.encode() for name, module in _read_neighbour_modules(path, text).items()}
-    left = _FILES_BYTES
-    for beside in sorted(path.parent.iterdir()):
-        if beside.suffix in (".py", ".ipynb", "") or beside.is_symlink() or not beside.is_file():
+    remaining_bytes = _FILES_BYTES
+    for neighbour in sorted(path.parent.iterdir()):
+        if neighbour.suffix in (".py", ".ipynb", "") or neighbour.is_symlink() or not neighbour.is_file():
             continue
-        left -= beside.stat().st_size
-        if left >= 0:
-            files[beside.name] = beside.read_bytes()
+        remaining_bytes -= neighbour.stat().st_size
+        if remaining_bytes >= 0:
+            files[neighbour.name] = neighbour.read_bytes()
     return files
 
 
@@ -230,31 +234,31 @@ def read_file(path: Path) -> bytes:
         UsageError: It cannot be read.
     """
     try:
-        found = path.stat()
-        if not stat.S_ISREG(found.st_mode):
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
             raise UsageError(f"{path} is not a file; expected one that can be read")
-        if found.st_size > _FILES_BYTES:
+        if status.st_size > _FILES_BYTES:
             raise UsageError(f"{path} is too large; expected at most {_FILES_BYTES >> 20} MB")
         return path.read_bytes()
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from error
 
 
-def _build_trial_spec(program: ProgramSpec, chosen: SimulatorSettings, options: RunOptions) -> TrialSpec:
+def _build_trial_spec(program: ProgramSpec, settings: SimulatorSettings, options: RunOptions) -> TrialSpec:
     """Return the spec of a trial with one robot and no responder, in the world that the flags choose."""
     return TrialSpec(
         program=program,
         responder=None,
-        collaborative=chosen.collaborative,
-        floor=options.floor or build_floor(chosen.background, seed=options.sheet_number),
-        robot=get_robot(chosen.robot),
-        pose=chosen.pose,
-        noise=Noise(chosen.light_noise, chosen.motor_noise),
+        collaborative=settings.collaborative,
+        floor=options.floor or build_floor(settings.background, seed=options.sheet_number),
+        robot=get_robot(settings.robot),
+        pose=settings.pose,
+        noise=Noise(settings.light_noise, settings.motor_noise),
         channel=options.channel,
         seconds=options.seconds,
         seed=options.seed,
         child_seed=options.seed,
-        pen_down=chosen.pen_down,
+        pen_down=settings.pen_down,
         tick=options.tick,
     )
 
@@ -264,26 +268,31 @@ def _build_program_spec(program: ProgramFile, flags: Flags, limits: RunLimits) -
     return ProgramSpec(program.code, flags.preamble, limits.program, limits.output_bytes, modules)
 
 
-def _build_partner_spec(second: ProgramFile, limits: RunLimits) -> PartnerSpec:
+def _build_partner_spec(second_program: ProgramFile, limits: RunLimits) -> PartnerSpec:
     """Return the second robot, as set up by its magic line."""
-    if not {"x", "y"} <= second.flags.values.keys():
-        name = second.path.name
+    if not {"x", "y"} <= second_program.flags.values.keys():
+        name = second_program.path.name
         raise UsageError(f"{name}: does not say where the second robot starts; expected -x and -y in line 1")
-    chosen = apply_flags(second.flags)
-    program = ProgramSpec(second.code, second.flags.preamble, limits.program, limits.output_bytes)
-    return PartnerSpec(program, chosen.pose, chosen.pen_down)
+    settings = apply_flags(second_program.flags)
+    program = ProgramSpec(second_program.code, second_program.flags.preamble, limits.program, limits.output_bytes)
+    return PartnerSpec(program, settings.pose, settings.pen_down)
 
 
 def _read_neighbour_modules(path: Path, text: str) -> Mapping[str, str]:
     """Return the modules that the text imports from the file's folder."""
 
-    def read(name: str) -> bytes | None:
-        beside = path.parent / name
-        if beside.is_symlink() or not beside.is_file() or name == path.name or beside.stat().st_size > _FILES_BYTES:
+    def read_module(name: str) -> bytes | None:
+        neighbour = path.parent / name
+        if (
+            neighbour.is_symlink()
+            or not neighbour.is_file()
+            or name == path.name
+            or neighbour.stat().st_size > _FILES_BYTES
+        ):
             return None
-        return beside.read_bytes()
+        return neighbour.read_bytes()
 
-    return find_modules(text, read)
+    return find_modules(text, read_module)
 
 
 def _parse_program(path: Path, text: str) -> ProgramFile:

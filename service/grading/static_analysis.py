@@ -60,23 +60,23 @@ def analyse(plan: RunPlan, trials: Sequence[TrialResult], caller: FunctionCaller
     """
     assignment = plan.assignment
     answers: dict[str, SourceAnswers] = {}
-    called: dict[str, CallResults] = {}
+    call_results: dict[str, CallResults] = {}
     checks: dict[tuple[str, int], CallResult] = {}
     # The instructor's checks have their own budget, separate from the submission's.
-    own = JobMeter(meter.limits, meter.heartbeat)
+    check_meter = JobMeter(meter.limits, meter.heartbeat)
     # Source rules come last, because they consider which code was executed.
     for criterion in sorted(assignment.criteria, key=lambda each: isinstance(each, SourceRules)):
         if isinstance(criterion, SourceRules) and criterion.part in plan.read_as:
             answers[criterion.id] = _read_source_answers(criterion, plan, caller, meter)
         elif isinstance(criterion, Functions) and plan.functions is not None:
-            called[criterion.id] = _call_functions(criterion, plan.functions, plan.child_seed, caller, meter)
+            call_results[criterion.id] = _call_functions(criterion, plan.functions, plan.child_seed, caller, meter)
         elif isinstance(criterion, PythonCheck):
-            for place, trial in enumerate(trials):
+            for index, trial in enumerate(trials):
                 if not criterion.scenarios or trial.scenario in criterion.scenarios:
-                    had = use_robot_recording(criterion.robot, trial)
-                    checks[criterion.id, place] = _run_check(criterion, had, assignment, caller, own)
-    sandbox = next((each.sandbox for each in called.values()), "")
-    return StaticAnalysis(answers, plan.flags, called, checks, sandbox, plan.missing)
+                    checked_trial = use_robot_recording(criterion.robot, trial)
+                    checks[criterion.id, index] = _run_check(criterion, checked_trial, assignment, caller, check_meter)
+    sandbox = next((each.sandbox for each in call_results.values()), "")
+    return StaticAnalysis(answers, plan.flags, call_results, checks, sandbox, plan.missing)
 
 
 def to_json_trial(trial: TrialResult) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def _read_source_answers(
     criterion: SourceRules, plan: RunPlan, caller: FunctionCaller, meter: JobMeter
 ) -> SourceAnswers:
     entries = _list_entry_points(plan.assignment) if criterion.part == "responder" else ()
-    asked = {
+    rules = {
         "uses": criterion.uses,
         "avoids": criterion.avoids,
         "in_loop": criterion.in_loop,
@@ -125,14 +125,14 @@ def _read_source_answers(
         "shown": SPEECH,
         "entries": (*criterion.defines, *entries),
     }
-    ran = plan.executed_statements.get(criterion.part)
-    was_run = sorted(ran.places) if ran is not None and ran.places else None
-    calls = [FunctionCall("read", [list(_read_files(criterion.part, plan)), asked, was_run])]
-    called = caller.call_functions(_READER, calls, 0, meter)
-    fault = called.fault or called.returned[0].fault
+    executed = plan.executed_statements.get(criterion.part)
+    executed_places = sorted(executed.places) if executed is not None and executed.places else None
+    calls = [FunctionCall("read", [list(_read_files(criterion.part, plan)), rules, executed_places])]
+    call_results = caller.call_functions(_READER, calls, 0, meter)
+    fault = call_results.fault or call_results.returned[0].fault
     if fault is not None:
         return SourceAnswers(error=f"it cannot be analysed ({describe_fault(fault)})")
-    return SourceAnswers.read(called.returned[0].value, criterion)
+    return SourceAnswers.read(call_results.returned[0].value, criterion)
 
 
 def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
@@ -142,11 +142,11 @@ def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
     """
     yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
-    left = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
+    remaining_characters = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
     for name, kind, content in _list_neighbour_files(part, plan):
-        if left > 0:
+        if remaining_characters > 0:
             yield {"name": name, kind: content[:_MOST_OF_ONE]}
-        left -= len(content)
+        remaining_characters -= len(content)
 
 
 def _list_neighbour_files(part: Part, plan: RunPlan) -> Iterator[tuple[str, str, str]]:
@@ -173,8 +173,8 @@ def _list_entry_points(assignment: Assignment) -> Iterator[str]:
 def _call_functions(
     criterion: Functions, functions: ResponderSpec, seed: int, caller: FunctionCaller, meter: JobMeter
 ) -> CallResults:
-    own = RandomStream(seed, f"calls {criterion.id}").integer(0) >> 1
-    return caller.call_functions(functions, list_calls(criterion), own, meter)
+    call_seed = RandomStream(seed, f"calls {criterion.id}").integer(0) >> 1
+    return caller.call_functions(functions, list_calls(criterion), call_seed, meter)
 
 
 def _run_check(
@@ -187,8 +187,8 @@ def _run_check(
         ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE),
         limits.output_bytes,
     )
-    called = caller.call_functions(check, [FunctionCall("check", [to_json_trial(trial)])], trial.seed, meter)
-    return called.returned[0] if called.returned else CallResult(fault=called.fault)
+    call_results = caller.call_functions(check, [FunctionCall("check", [to_json_trial(trial)])], trial.seed, meter)
+    return call_results.returned[0] if call_results.returned else CallResult(fault=call_results.fault)
 
 
 def _to_json_pose(pose: Pose) -> dict[str, float]:

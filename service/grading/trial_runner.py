@@ -93,7 +93,8 @@ class TrialRunner:
     ) -> ExecutedNotebook:
         """Execute a notebook from top to bottom, with all its runs.
 
-        ``planner`` serves one execution, so callers use ``undisturbed`` themselves. Raises the same errors as ``run``.
+        ``planner`` serves one execution, so callers use ``run_with_retries`` themselves. Raises the same errors as
+        ``run``.
         """
         return execute_notebook(spec, planner, self._prepare_arena_and_camera, self._sandboxes, meter or JobMeter())
 
@@ -139,8 +140,8 @@ class TrialRunner:
 
     def start_zygotes(self, processes: Iterable[ProgramSpec | ResponderSpec]) -> None:
         """Start the zygotes for these processes in parallel, without waiting."""
-        for role, without in dict.fromkeys((each.role, each.limits.excluded_modules) for each in processes):
-            self._sandboxes.begin(role, without)
+        for role, excluded_modules in dict.fromkeys((each.role, each.limits.excluded_modules) for each in processes):
+            self._sandboxes.begin(role, excluded_modules)
 
     def check_sandbox(self) -> str:
         """Return the active sandbox layers.
@@ -187,11 +188,11 @@ class TrialRunner:
 
         If a child imported an unexpected library, the repeated run provides the library from the start.
         """
-        before = meter.spent
+        spent_before = meter.spent
         try:
             return self._run_unless_killed(work, meter)
         except LibrariesNeeded:
-            meter.refund_since(before)
+            meter.refund_since(spent_before)
             self._sandboxes.enable_libraries(meter)
         return self._run_unless_killed(work, meter)
 
@@ -201,19 +202,19 @@ class TrialRunner:
         Children of other graders may have used the memory. A child killed twice, the second time alone, is at fault
         itself.
         """
-        before = meter.spent
+        spent_before = meter.spent
         try:
             with self._slots.shared_lock(meter.heartbeat) if self._slots is not None else nullcontext():
                 return _run_on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run again, alone: %s", killed)
-        meter.refund_since(before)
+        meter.refund_since(spent_before)
         try:
             with self._exclusive_lock(meter):
                 return _run_on_one_processor(work)
         except KilledFromOutside as killed:
             _log.warning("the trial is run a last time, alone: %s", killed)
-        meter.refund_since(before)
+        meter.refund_since(spent_before)
         with self._exclusive_lock(meter), self._sandboxes.blaming():
             return _run_on_one_processor(work)
 

@@ -46,7 +46,7 @@ def build_authorization_url(
     platform: Platform, redirect_uri: str, login_hint: str, message_hint: str | None, state: str, nonce: str
 ) -> str:
     """Return the platform's address that authenticates the user."""
-    asked = {
+    parameters = {
         "scope": "openid",
         "response_type": "id_token",
         "response_mode": "form_post",
@@ -58,9 +58,9 @@ def build_authorization_url(
         "nonce": nonce,
     }
     if message_hint:
-        asked["lti_message_hint"] = message_hint
+        parameters["lti_message_hint"] = message_hint
     separator = "&" if "?" in platform.authorization_url else "?"
-    return f"{platform.authorization_url}{separator}{urlencode(asked)}"
+    return f"{platform.authorization_url}{separator}{urlencode(parameters)}"
 
 
 def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
@@ -73,9 +73,9 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
         raise UsageError("this launch does not use LTI 1.3")
     if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
         raise UsageError("this launch does not come from a link in a course; open Robomark from a course link")
-    deployment = claims.get(f"{CLAIM}deployment_id")
-    if not isinstance(deployment, str) or deployment not in pending.platform.deployments:
-        raise UsageError(f"the deployment of this launch is not registered: {str(deployment)[:80]!r}")
+    deployment_id = claims.get(f"{CLAIM}deployment_id")
+    if not isinstance(deployment_id, str) or deployment_id not in pending.platform.deployments:
+        raise UsageError(f"the deployment of this launch is not registered: {str(deployment_id)[:80]!r}")
     context = _read_object(claims, f"{CLAIM}context")
     context_id = context.get("id")
     subject = claims.get("sub")
@@ -86,7 +86,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
         subject=subject,
         student=_parse_student(claims, pending.platform, subject),
         role=parse_role(claims.get(f"{CLAIM}roles")),
-        deployment=deployment,
+        deployment=deployment_id,
         context=context_id,
         course_title=str(title)[:_LONGEST_TEXT],
         members_url=read_string(_read_object(claims, MEMBERS_CLAIM), "context_memberships_url"),
@@ -96,8 +96,8 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
 
 def parse_role(roles: object) -> Role:
     """Return instructor for an instructor of the course, otherwise student. Roles in the institution do not count."""
-    named = {role for role in roles if isinstance(role, str)} if isinstance(roles, list) else set()
-    return Role.INSTRUCTOR if named & {f"{_MEMBERSHIP_ROLES}#Instructor", "Instructor"} else Role.STUDENT
+    role_names = {role for role in roles if isinstance(role, str)} if isinstance(roles, list) else set()
+    return Role.INSTRUCTOR if role_names & {f"{_MEMBERSHIP_ROLES}#Instructor", "Instructor"} else Role.STUDENT
 
 
 def build_student(platform: Platform, subject: str, id: str | None, name: str | None, email: str | None) -> Student:
@@ -112,8 +112,8 @@ def _verify_token(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
     platform = pending.platform
     keys = fetch_json(platform.keys_url).value
     try:
-        known = PyJWKSet.from_dict(keys)
-        key = known[jwt.get_unverified_header(id_token).get("kid", "")]
+        key_set = PyJWKSet.from_dict(keys)
+        key = key_set[jwt.get_unverified_header(id_token).get("kid", "")]
         claims: dict[str, Any] = jwt.decode(
             id_token,
             key,
@@ -134,13 +134,13 @@ def _verify_token(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
 
 
 def _parse_student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:
-    known = read_string(_read_object(claims, f"{CLAIM}lis"), "person_sourcedid")
-    return build_student(platform, subject, known, read_string(claims, "name"), read_string(claims, "email"))
+    student_id = read_string(_read_object(claims, f"{CLAIM}lis"), "person_sourcedid")
+    return build_student(platform, subject, student_id, read_string(claims, "name"), read_string(claims, "email"))
 
 
 def _read_object(claims: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = claims.get(name)
-    return found if isinstance(found, dict) else {}
+    value = claims.get(name)
+    return value if isinstance(value, dict) else {}
 
 
 def read_string(table: Mapping[str, Any], name: str) -> str | None:

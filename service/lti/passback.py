@@ -51,9 +51,9 @@ def _load_published_scores(session: Session, link: CourseLink, course_id: int, a
         .order_by(SubmissionRow.id)
     )
     # A platform ignores scores that are not newer than its own, and marks can change after publication.
-    at = now(session)
+    sent_at = now(session)
     return [
-        Score(subjects[student], marks, max_marks, at)
+        Score(subjects[student], marks, max_marks, sent_at)
         for student, marks, max_marks in session.execute(query)
         if student in subjects and marks is not None and max_marks
     ]

@@ -34,9 +34,11 @@ def fetch_json(
 ) -> PlatformReply:
     """Send one request and return the reply. Raises PlatformError, with the host, for a failure or invalid JSON."""
     host = url.partition("//")[2].partition("/")[0]
-    told = {"User-Agent": f"Robomark/{GRADER_VERSION}", **(headers or {})}
+    request_headers = {"User-Agent": f"Robomark/{GRADER_VERSION}", **(headers or {})}
     try:
-        answer = send_request(url, method=method, body=body, headers=told, others=ALL_NETWORKS, most_bytes=_MOST_BYTES)
+        answer = send_request(
+            url, method=method, body=body, headers=request_headers, allowlist=ALL_NETWORKS, most_bytes=_MOST_BYTES
+        )
     except RequestFailure as error:
         raise PlatformError(f"The platform at {host} cannot be reached: {error}") from None
     # Requests contain our token, which no other host may get, so a redirection is an error, too.

@@ -66,18 +66,18 @@ def fetch_members(store: Store, link: CourseLink) -> list[PlatformMember]:
         raise PlatformError("The platform did not send the address of its member list")
     _check_origin(link.platform, link.members_url)
     headers = {"accept": _MEMBERS, "authorization": f"Bearer {_request_token(store, link.platform, _MEMBERS_SCOPE)}"}
-    found = []
+    members = []
     for page in _fetch_pages(link.platform, link.members_url, headers):
-        for each in read_objects(page.get("members") if isinstance(page, dict) else None):
-            subject = read_string(each, "user_id")
-            if subject is None or each.get("status", "Active") != "Active":
+        for member in read_objects(page.get("members") if isinstance(page, dict) else None):
+            subject = read_string(member, "user_id")
+            if subject is None or member.get("status", "Active") != "Active":
                 continue
-            parts = (read_string(each, "given_name"), read_string(each, "family_name"))
-            name = read_string(each, "name") or " ".join(filter(None, parts))
-            known, email = read_string(each, "lis_person_sourcedid"), read_string(each, "email")
-            student = build_student(link.platform, subject, known, name, email)
-            found.append(PlatformMember(subject, student, parse_role(_expand_roles(each.get("roles")))))
-    return found
+            parts = (read_string(member, "given_name"), read_string(member, "family_name"))
+            name = read_string(member, "name") or " ".join(filter(None, parts))
+            student_id, email = read_string(member, "lis_person_sourcedid"), read_string(member, "email")
+            student = build_student(link.platform, subject, student_id, name, email)
+            members.append(PlatformMember(subject, student, parse_role(_expand_roles(member.get("roles")))))
+    return members
 
 
 def send_scores(store: Store, link: CourseLink, assignment: str, title: str, scores: list[Score]) -> int:
@@ -95,7 +95,7 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
         link.platform, link.lineitems_url, token, assignment, title, max(each.max_marks for each in scores)
     )
     path, _, query = column.partition("?")
-    where = f"{path.rstrip('/')}/scores" + (f"?{query}" if query else "")
+    scores_url = f"{path.rstrip('/')}/scores" + (f"?{query}" if query else "")
     for score in scores:
         body = {
             "userId": score.subject,
@@ -107,7 +107,7 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
             "comment": score.comment,
         }
         headers = {"content-type": _SCORE, "authorization": f"Bearer {token}"}
-        _send_request(link.platform, where, method="POST", body=json.dumps(body).encode(), headers=headers)
+        _send_request(link.platform, scores_url, method="POST", body=json.dumps(body).encode(), headers=headers)
     return len(scores)
 
 
@@ -120,40 +120,40 @@ def _ensure_column(
         for item in read_objects(page):
             if item.get("resourceId") == assignment and isinstance(item.get("id"), str):
                 return str(item["id"])
-    wanted = {"label": title, "scoreMaximum": float(max_marks), "resourceId": assignment, "tag": "robomark"}
-    made = _send_request(
+    description = {"label": title, "scoreMaximum": float(max_marks), "resourceId": assignment, "tag": "robomark"}
+    column = _send_request(
         platform,
         lineitems_url,
         method="POST",
-        body=json.dumps(wanted).encode(),
+        body=json.dumps(description).encode(),
         headers={"content-type": _LINEITEM, "accept": _LINEITEM, "authorization": f"Bearer {token}"},
     ).value
-    if not isinstance(made, dict) or not isinstance(made.get("id"), str):
+    if not isinstance(column, dict) or not isinstance(column.get("id"), str):
         raise PlatformError("The platform did not create a column for the marks")
-    return str(made["id"])
+    return str(column["id"])
 
 
 def _request_token(store: Store, platform: Platform, scopes: str) -> str:
     """Request an access token with a signed assertion (RFC 7523)."""
     with store.transaction() as session:
         key_id, pem = ensure_signing_key(session)
-    at = int(time.time())
+    issued_at = int(time.time())
     claims = {
         "iss": platform.client_id,
         "sub": platform.client_id,
         "aud": platform.token_url,
-        "iat": at,
-        "exp": at + _ASSERTION_SECONDS,
+        "iat": issued_at,
+        "exp": issued_at + _ASSERTION_SECONDS,
         "jti": str(uuid.uuid4()),
     }
-    asked = {
+    parameters = {
         "grant_type": "client_credentials",
         "client_assertion_type": "urn:ietf:params:oauth:client-assertion-type:jwt-bearer",
         "client_assertion": jwt.encode(claims, pem, algorithm="RS256", headers={"kid": key_id}),
         "scope": scopes,
     }
     headers = {"content-type": "application/x-www-form-urlencoded"}
-    answer = fetch_json(platform.token_url, method="POST", body=urlencode(asked).encode(), headers=headers).value
+    answer = fetch_json(platform.token_url, method="POST", body=urlencode(parameters).encode(), headers=headers).value
     token = answer.get("access_token") if isinstance(answer, dict) else None
     if not isinstance(token, str):
         raise PlatformError("The platform did not return an access token")
@@ -176,16 +176,16 @@ def _check_origin(platform: Platform, url: str) -> None:
 
 def _fetch_pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator[Any]:
     for _ in range(_MOST_PAGES):
-        fetched = _send_request(platform, url, headers=headers)
-        yield fetched.value
-        further = _NEXT_LINK.search(fetched.link)
-        if further is None:
+        reply = _send_request(platform, url, headers=headers)
+        yield reply.value
+        next_link = _NEXT_LINK.search(reply.link)
+        if next_link is None:
             return
-        url = further[1]
+        url = next_link[1]
 
 
 def _expand_roles(roles: object) -> list[str]:
     """Return roles with their full names: short names are allowed in member lists."""
-    named = roles if isinstance(roles, list) else []
+    role_names = roles if isinstance(roles, list) else []
     prefix = "http://purl.imsglobal.org/vocab/lis/v2/membership#"
-    return [role if "/" in role else f"{prefix}{role}" for role in named if isinstance(role, str)]
+    return [role if "/" in role else f"{prefix}{role}" for role in role_names if isinstance(role, str)]

@@ -32,16 +32,16 @@ class OwnAppeals:
 
 
 def list_open(
-    service: Service, actor: Actor, course_id: int, *, limit: int | None = None, after: int | None = None
+    service: Service, actor: Actor, course_id: int, *, limit: int | None = None, last_id: int | None = None
 ) -> list[AppealLine]:
     """Return the open appeals of a course, oldest first. Raises NotFound.
 
-    ``after`` is the id of the last appeal on the previous page.
+    ``last_id`` is the id of the last appeal on the previous page.
     """
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        return appeals.list_open_appeals(session, course_id, hidden, limit=limit, after=after)
+        return appeals.list_open_appeals(session, course_id, hidden_names, limit=limit, last_id=last_id)
 
 
 def list_answered(
@@ -50,16 +50,16 @@ def list_answered(
     course_id: int,
     *,
     limit: int | None = None,
-    after: tuple[datetime, int] | None = None,
+    cursor: tuple[datetime, int] | None = None,
 ) -> list[AppealLine]:
     """Return the answered appeals of a course, newest answer first. Raises NotFound.
 
-    ``after`` is the answer time and id of the last appeal on the previous page.
+    ``cursor`` is the answer time and id of the last appeal on the previous page.
     """
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        return appeals.list_answered_appeals(session, course_id, hidden, limit=limit, after=after)
+        return appeals.list_answered_appeals(session, course_id, hidden_names, limit=limit, cursor=cursor)
 
 
 @retry_conflicts
@@ -78,10 +78,14 @@ def show_own(service: Service, actor: Actor, course_id: int, submission_id: int)
     """Return the appeals of a submission of the actor, with their permission to appeal now. Raises NotFound."""
     with service.store.reading() as session:
         row = _require_student_submission(session, actor, course_id, submission_id)
-        earlier = appeals.load_appeals(session, submission_id)
-        may = appeals.can_appeal(session, submission_id) and all(each.answered_at is not None for each in earlier)
+        earlier_appeals = appeals.load_appeals(session, submission_id)
+        can_appeal = appeals.can_appeal(session, submission_id) and all(
+            each.answered_at is not None for each in earlier_appeals
+        )
         titles = {each.assignment: each.title for each in open_assignments.list_assignments(session, course_id)}
-    return OwnAppeals(row.id, row.assignment, titles.get(row.assignment, row.assignment), row.attempt, earlier, may)
+    return OwnAppeals(
+        row.id, row.assignment, titles.get(row.assignment, row.assignment), row.attempt, earlier_appeals, can_appeal
+    )
 
 
 @retry_conflicts

@@ -63,14 +63,14 @@ def upload(service: Service, actor: Actor, course_id: int, request: UploadReques
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
     folder = _unpack_assignment(request.path)
-    found = read_assignment(folder)
+    assignment = read_assignment(folder)
     if not request.replace:
-        _check_replacement(service, course_id, found)
-    made = prepare(service, actor, course_id, found)
+        _check_replacement(service, course_id, assignment)
+    course_assignment = prepare(service, actor, course_id, assignment)
     reference = folder / EXAMPLES / REFERENCE
     if reference.is_dir():
-        _grade_reference(service, actor, course_id, found, reference)
-    return made
+        _grade_reference(service, actor, course_id, assignment, reference)
+    return course_assignment
 
 
 def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> str:
@@ -81,60 +81,62 @@ def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> 
     """
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        found = open_assignments.load_assignment(session, course_id, assignment)
-    reference = find_reference_solution(found)
+        current_version = open_assignments.load_assignment(session, course_id, assignment)
+    reference = find_reference_solution(current_version)
     if reference is None:
         raise UsageError(
             "this version of %(assignment)s has no reference solution; upload its folder again",
             assignment=assignment,
         )
-    return _grade_reference(service, actor, course_id, found, reference)
+    return _grade_reference(service, actor, course_id, current_version, reference)
 
 
-def find_reference_solution(found: Assignment) -> Path | None:
+def find_reference_solution(assignment: Assignment) -> Path | None:
     """Return the catalogue's reference solution; None if the course uses a different version."""
-    if found.id not in list_catalogue_ids() or find_in_catalogue(found.id).version != found.version:
+    if assignment.id not in list_catalogue_ids() or find_in_catalogue(assignment.id).version != assignment.version:
         return None
-    folder = locate_assignment_folder(found.id) / EXAMPLES / REFERENCE
+    folder = locate_assignment_folder(assignment.id) / EXAMPLES / REFERENCE
     return folder if folder.is_dir() else None
 
 
-def _check_replacement(service: Service, course_id: int, found: Assignment) -> None:
+def _check_replacement(service: Service, course_id: int, assignment: Assignment) -> None:
     with service.store.reading() as session:
-        there = [each for each in open_assignments.list_assignments(session, course_id) if each.assignment == found.id]
-    if any(each.opened_at is not None and each.version != found.version for each in there):
+        existing_assignments = [
+            each for each in open_assignments.list_assignments(session, course_id) if each.assignment == assignment.id
+        ]
+    if any(each.opened_at is not None and each.version != assignment.version for each in existing_assignments):
         raise AssignmentAlreadySeen(
             "%(id)s: students have already seen another assignment with this ID, %(title)s; "
             "use another ID, or confirm that yours replaces it",
-            id=found.id,
-            title=repr(there[0].title),
+            id=assignment.id,
+            title=repr(existing_assignments[0].title),
         )
 
 
-def _grade_reference(service: Service, actor: Actor, course_id: int, found: Assignment, reference: Path) -> str:
+def _grade_reference(service: Service, actor: Actor, course_id: int, assignment: Assignment, reference: Path) -> str:
     with service.store.reading() as session:
         student = Student(require_own_enrolment(session, actor, course_id, Role.INSTRUCTOR).written)
         course = session.get_one(Course, course_id).name
-    submission = read_submission(reference, student=student.id, asked=found.parts)
-    accepted = intake.accept_submission(
+    submission = read_submission(reference, student=student.id, required_parts=assignment.parts)
+    accepted_submission = intake.accept_submission(
         service.store,
-        GradingRequest(submission, found, REFERENCE, listed_student=student),
+        GradingRequest(submission, assignment, REFERENCE, listed_student=student),
         course=course,
         max_attempts=service.settings.max_attempts,
     )
-    if accepted.copied_from is None:
+    if accepted_submission.copied_from is None:
         service.notifier.grade(JobQueue.INTERACTIVE)
-    return accepted.job_id
+    return accepted_submission.job_id
 
 
 def _unpack_assignment(path: Path) -> Path:
     """Unzip an assignment and return its folder: the top level, or the only folder in it."""
     # Error messages name this folder if the zip has no top folder.
-    inside = path.parent / "unpacked" / path.stem
-    inside.mkdir(parents=True)
-    unzip(path, inside, _MOST_ENTRIES, _MOST_BYTES)
-    found = [each for each in inside.iterdir() if each.name != "__MACOSX"]
-    folder = found[0] if len(found) == 1 and found[0].is_dir() else inside
+    destination = path.parent / "unpacked" / path.stem
+    destination.mkdir(parents=True)
+    unzip(path, destination, _MOST_ENTRIES, _MOST_BYTES)
+    entries = [each for each in destination.iterdir() if each.name != "__MACOSX"]
+    folder = entries[0] if len(entries) == 1 and entries[0].is_dir() else destination
     if not (folder / FILE_NAME).is_file():
         raise UsageError(
             "%(zip)s: has no %(file)s, expected it at the top level or in the only folder",

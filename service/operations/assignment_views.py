@@ -52,9 +52,9 @@ def show_all(service: Service, actor: Actor, course_id: int) -> CourseAssignment
     """Return the assignments of a course with its policies. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        allowed = policies.load_policies(session, course_id)
-        prepared = open_assignments.list_assignments(session, course_id)
-    return CourseAssignments(prepared, allowed, allowed.get("") or PolicyLimits())
+        limits_by_assignment = policies.load_policies(session, course_id)
+        course_assignments = open_assignments.list_assignments(session, course_id)
+    return CourseAssignments(course_assignments, limits_by_assignment, limits_by_assignment.get("") or PolicyLimits())
 
 
 def load(service: Service, actor: Actor, course_id: int, assignment: str) -> tuple[CourseAssignment, Assignment]:
@@ -67,19 +67,19 @@ def load(service: Service, actor: Actor, course_id: int, assignment: str) -> tup
 
 def show(service: Service, actor: Actor, course_id: int, assignment: str) -> AssignmentView:
     """Return one assignment of a course with the data of its page. Raises like ``load``."""
-    line, found = load(service, actor, course_id, assignment)
+    line, current_version = load(service, actor, course_id, assignment)
     with service.store.reading() as session:
-        allowed = policies.load_policies(session, course_id)
-        own = require_own_enrolment(session, actor, course_id, Role.INSTRUCTOR)
-        previews = own_gradings.list_newest_gradings(session, own.id, assignment)
-    own_policy = allowed.get(assignment)
-    newest = find_in_catalogue(assignment).version if assignment in list_catalogue_ids() else line.version
+        limits_by_assignment = policies.load_policies(session, course_id)
+        enrolment = require_own_enrolment(session, actor, course_id, Role.INSTRUCTOR)
+        previews = own_gradings.list_newest_gradings(session, enrolment.id, assignment)
+    own_policy = limits_by_assignment.get(assignment)
+    newest_version = find_in_catalogue(assignment).version if assignment in list_catalogue_ids() else line.version
     return AssignmentView(
         line,
-        found,
+        current_version,
         own_policy,
-        own_policy or allowed.get("") or PolicyLimits(),
+        own_policy or limits_by_assignment.get("") or PolicyLimits(),
         previews,
-        has_reference=find_reference_solution(found) is not None,
-        changed=newest != line.version,
+        has_reference=find_reference_solution(current_version) is not None,
+        changed=newest_version != line.version,
     )

@@ -24,13 +24,13 @@ def prepare(service: Service, actor: Actor, course_id: int, assignment: Assignme
 
     Raises NotFound if the course does not exist, or the actor does not instruct it.
     """
-    frozen = freeze_assignment(assignment)
+    frozen_assignment = freeze_assignment(assignment)
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        made = open_assignments.prepare_assignment(session, course_id, frozen)
-        detail = {"assignment": made.assignment, "version": made.version}
+        course_assignment = open_assignments.prepare_assignment(session, course_id, frozen_assignment)
+        detail = {"assignment": course_assignment.assignment, "version": course_assignment.version}
         audit.record_action(session, actor.name, "prepare", "course", str(course_id), **detail)
-    return made
+    return course_assignment
 
 
 def open_for_students(service: Service, actor: Actor, course_id: int, assignment: str) -> CourseAssignment:
@@ -54,13 +54,15 @@ def remove(service: Service, actor: Actor, course_id: int, assignment: str) -> N
         audit.record_action(session, actor.name, "remove", "course", str(course_id), assignment=assignment)
 
 
-def hide_names(service: Service, actor: Actor, course_id: int, assignment: str, *, hidden: bool) -> CourseAssignment:
+def hide_names(
+    service: Service, actor: Actor, course_id: int, assignment: str, *, names_hidden: bool
+) -> CourseAssignment:
     """Hide or show students' names to all instructors of the course. Raises like ``open_for_students``."""
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        open_assignments.hide_names(session, course_id, assignment, hidden)
+        open_assignments.hide_names(session, course_id, assignment, names_hidden)
         audit.record_action(
-            session, actor.name, "names", "course", str(course_id), assignment=assignment, hidden=hidden
+            session, actor.name, "names", "course", str(course_id), assignment=assignment, hidden=names_hidden
         )
         return open_assignments.load_course_assignment(session, course_id, assignment)
 

@@ -121,25 +121,29 @@ class OverviewView:
     missing: tuple[Student, ...]
 
 
-def list_batches_page(service: Service, actor: Actor, course_id: int, after: str = "") -> BatchesPage:
-    """Return the newest batches of a course, or those older than the batch ``after``. Raises NotFound."""
+def list_batches_page(service: Service, actor: Actor, course_id: int, last_id: str = "") -> BatchesPage:
+    """Return the newest batches of a course, or those older than the batch ``last_id``. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        last = session.get(Batch, after) if after else None
-        place = None if last is None or last.course_id != course_id else (last.created_at, last.id)
-        found = batches.list_course_batches(session, course_id, _PAGE_SIZE + 1, place)
-        prepared = open_assignments.list_assignments(session, course_id)
-    shown = tuple(found[:_PAGE_SIZE])
-    return BatchesPage(shown, shown[-1].id if len(found) > len(shown) else "", tuple(prepared))
+        last_batch = session.get(Batch, last_id) if last_id else None
+        cursor = (
+            None if last_batch is None or last_batch.course_id != course_id else (last_batch.created_at, last_batch.id)
+        )
+        batch_lines = batches.list_course_batches(session, course_id, _PAGE_SIZE + 1, cursor)
+        course_assignments = open_assignments.list_assignments(session, course_id)
+    page_lines = tuple(batch_lines[:_PAGE_SIZE])
+    return BatchesPage(
+        page_lines, page_lines[-1].id if len(batch_lines) > len(page_lines) else "", tuple(course_assignments)
+    )
 
 
 def list_batches(
-    service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
+    service: Service, actor: Actor, course_id: int, limit: int, cursor: tuple[datetime, str] | None = None
 ) -> list[BatchLine]:
     """Return the newest batches of a course, after the batch with this time and id. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        return batches.list_course_batches(session, course_id, limit, after)
+        return batches.list_course_batches(session, course_id, limit, cursor)
 
 
 def list_newest(service: Service, actor: Actor, course: str | None) -> list[BatchLine]:
@@ -173,63 +177,63 @@ def show_progress(service: Service, actor: Actor, course_id: int, batch_id: str)
 
 def show_table(service: Service, actor: Actor, course_id: int, batch_id: str) -> TableView:
     """Return a batch with a row for each submission and rejection. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         view = _load_view(session, actor, course_id, batch_id)
-        lines = batch_table.load_table_lines(session, batch_id, view.batch.refusals, hidden)
+        lines = batch_table.load_table_lines(session, batch_id, view.batch.refusals, hidden_names)
         history = audit.load_entries(session, "batch", batch_id)
-        waiting = _count_waiting_regrades(session, view.batch)
-    nameless = bool(hidden.assignments & {each.assignment for each in lines})
-    return TableView(view, tuple(lines), nameless, waiting, tuple(reversed(history)))
+        waiting_regrades = _count_waiting_regrades(session, view.batch)
+    has_hidden_names = bool(hidden_names.assignments & {each.assignment for each in lines})
+    return TableView(view, tuple(lines), has_hidden_names, waiting_regrades, tuple(reversed(history)))
 
 
 def show_table_page(
-    service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], asked: TableRequest
+    service: Service, actor: Actor, course_id: int, lines: Sequence[TableLine], request: TableRequest
 ) -> tuple[TablePage, dict[str, ReviewCounts]]:
     """Return a page of the rows, and their review counts by job. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        table = batch_table.build_table_page(lines, asked)
+        table = batch_table.build_table_page(lines, request)
         return table, batch_table.load_review_counts(session, table.lines)
 
 
 def show_graded(service: Service, actor: Actor, course_id: int, batch_id: str) -> GradedView:
     """Return a batch with its grades and their statistics. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        return _load_graded_view(session, actor, course_id, batch_id, hidden)
+        return _load_graded_view(session, actor, course_id, batch_id, hidden_names)
 
 
 def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -> StatusView:
     """Return the complete status of a batch. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        graded = _load_graded_view(session, actor, course_id, batch_id, hidden)
-        is_regrade = graded.view.batch.regrade_of is not None
-        changes = regrades.load_changes(session, batch_id, hidden) if is_regrade else []
-        ranks = rankings.build_rank_tables(session, graded.lines)
+        graded_view = _load_graded_view(session, actor, course_id, batch_id, hidden_names)
+        is_regrade = graded_view.view.batch.regrade_of is not None
+        changes = regrades.load_changes(session, batch_id, hidden_names) if is_regrade else []
+        ranks = rankings.build_rank_tables(session, graded_view.lines)
         history = audit.load_entries(session, "batch", batch_id)
-    return StatusView(graded, tuple(ranks), tuple(changes), tuple(history))
+    return StatusView(graded_view, tuple(ranks), tuple(changes), tuple(history))
 
 
 def list_grades(
-    service: Service, actor: Actor, course_id: int, batch_id: str, limit: int, after: str | None = None
+    service: Service, actor: Actor, course_id: int, batch_id: str, limit: int, last_id: str | None = None
 ) -> list[JobLine]:
-    """Return at most ``limit`` grades of a batch, after the one with the id ``after``. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    """Return at most ``limit`` grades of a batch, after the one with the id ``last_id``. Raises NotFound."""
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return batches.load_job_lines_page(session, batch_id, hidden, limit, after)
+        return batches.load_job_lines_page(session, batch_id, hidden_names, limit, last_id)
 
 
-def list_submitted(service: Service, actor: Actor, done: SubmittedBatch) -> list[JobLine]:
+def list_submitted(service: Service, actor: Actor, submitted_batch: SubmittedBatch) -> list[JobLine]:
     """Return the grades of new submissions and of those known before, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        lines = [batches.load_job_line(session, known.job_id) for known in done.known]
-        if done.batch is not None:
-            lines += batches.load_attempt_lines(session, done.batch.id)
+        lines = [batches.load_job_line(session, known.job_id) for known in submitted_batch.known]
+        if submitted_batch.batch is not None:
+            lines += batches.load_attempt_lines(session, submitted_batch.batch.id)
     return sorted(lines, key=lambda line: (line.student, line.id))
 
 
@@ -247,32 +251,32 @@ def show_overview(
 
     Raises NotFound.
     """
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         row = require_batch(session, course_id, batch_id)
         line = batches.load_batch(session, row.id)
-        lines = tuple(batch_table.load_table_lines(session, row.id, line.refusals, hidden))
-        return _build_overview(session, course_id, line, lines, pass_share, hidden)
+        lines = tuple(batch_table.load_table_lines(session, row.id, line.refusals, hidden_names))
+        return _build_overview(session, course_id, line, lines, pass_share, hidden_names)
 
 
 def show_overview_of_table(
     service: Service, actor: Actor, course_id: int, table: TableView, pass_share: Decimal = PASS_SHARE
 ) -> OverviewView:
     """Return the overview of a table that the actor has already loaded. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        return _build_overview(session, course_id, table.view.batch, table.lines, pass_share, hidden)
+        return _build_overview(session, course_id, table.view.batch, table.lines, pass_share, hidden_names)
 
 
 def show_changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
     """Return a page of the changes of a batch of regrades, different marks first. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return regrades.load_changes_page(session, batch_id, number, hidden)
+        return regrades.load_changes_page(session, batch_id, number, hidden_names)
 
 
 def is_graded(line: TableLine) -> bool:
@@ -286,11 +290,13 @@ def _build_overview(
     line: BatchLine,
     lines: tuple[TableLine, ...],
     pass_share: Decimal,
-    hidden: HiddenNames,
+    hidden_names: HiddenNames,
 ) -> OverviewView:
-    classes = compute_overviews(session, course_id, lines, pass_share, hidden)
-    asked = line.web_assignment if not classes else None
-    return OverviewView(line, lines, classes, load_missing_students(session, course_id, asked, hidden) if asked else ())
+    classes = compute_overviews(session, course_id, lines, pass_share, hidden_names)
+    assignment = line.web_assignment if not classes else None
+    return OverviewView(
+        line, lines, classes, load_missing_students(session, course_id, assignment, hidden_names) if assignment else ()
+    )
 
 
 def _load_view(session: Session, actor: Actor, course_id: int, batch_id: str) -> BatchView:
@@ -300,9 +306,11 @@ def _load_view(session: Session, actor: Actor, course_id: int, batch_id: str) ->
     return BatchView(line, batches.load_progress(session, batch_id), metrics.estimate_pace(session, batch_id))
 
 
-def _load_graded_view(session: Session, actor: Actor, course_id: int, batch_id: str, hidden: HiddenNames) -> GradedView:
+def _load_graded_view(
+    session: Session, actor: Actor, course_id: int, batch_id: str, hidden_names: HiddenNames
+) -> GradedView:
     view = _load_view(session, actor, course_id, batch_id)
-    lines = tuple(batches.load_job_lines(session, batch_id, hidden))
+    lines = tuple(batches.load_job_lines(session, batch_id, hidden_names))
     return GradedView(view, lines, _compute_statistics(session, lines), _count_waiting_regrades(session, view.batch))
 
 

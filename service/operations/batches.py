@@ -129,23 +129,27 @@ def submit(service: Service, actor: Actor, course_id: int, request: SubmitReques
     """
     with service.store.reading() as session:
         course = require_course(session, actor, course_id, Role.INSTRUCTOR).name
-    checked = request.contents
-    if not checked.grading_requests:
-        raise _build_rejection_error(checked.refusals)
-    record = partial(_record_submission, actor.name, len(checked.refusals))
-    batch = (request.name, checked.grading_requests, checked.refusals)
-    most = service.settings.max_attempts
+    contents = request.contents
+    if not contents.grading_requests:
+        raise _build_rejection_error(contents.refusals)
+    record = partial(_record_submission, actor.name, len(contents.refusals))
+    batch = (request.name, contents.grading_requests, contents.refusals)
+    max_attempts = service.settings.max_attempts
     if request.again:
-        made = intake.accept_batch(service.store, *batch, course=course, max_attempts=most, record=record)
-        accepted = BatchIntake(made, (), made.refused)
+        accepted_batch = intake.accept_batch(
+            service.store, *batch, course=course, max_attempts=max_attempts, record=record
+        )
+        batch_intake = BatchIntake(accepted_batch, (), accepted_batch.refused)
     else:
-        accepted = intake.accept_new_submissions(service.store, *batch, course=course, max_attempts=most, record=record)
-    refusals = (*checked.refusals, *accepted.refused)
-    if accepted.batch is None and not accepted.known:
+        batch_intake = intake.accept_new_submissions(
+            service.store, *batch, course=course, max_attempts=max_attempts, record=record
+        )
+    refusals = (*contents.refusals, *batch_intake.refused)
+    if batch_intake.batch is None and not batch_intake.known:
         raise _build_rejection_error(refusals)
-    done = _hide_names(accepted, refusals, load_names_for_actor(service, actor, course_id))
-    service.notifier.grade(JobQueue.BATCH, done.queued)
-    return done
+    submitted_batch = _hide_names(batch_intake, refusals, load_names_for_actor(service, actor, course_id))
+    service.notifier.grade(JobQueue.BATCH, submitted_batch.queued)
+    return submitted_batch
 
 
 def resolve_course(service: Service, actor: Actor, name: str | None) -> int:
@@ -156,11 +160,13 @@ def resolve_course(service: Service, actor: Actor, name: str | None) -> int:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        named = session.scalars(select(Course.id).where(Course.name == (name or DEFAULT_COURSE))).one_or_none()
-        if name is not None and named is None:
+        named_course_id = session.scalars(
+            select(Course.id).where(Course.name == (name or DEFAULT_COURSE))
+        ).one_or_none()
+        if name is not None and named_course_id is None:
             return require_named_course(session, actor, name).id
-    if named is not None:
-        return named
+    if named_course_id is not None:
+        return named_course_id
     with service.store.transaction() as session:
         return ensure_course(session, DEFAULT_COURSE, now(session))
 
@@ -181,14 +187,16 @@ def preview_submissions(
     service: Service, actor: Actor, course_id: int, contents: BatchContents
 ) -> list[SubmissionPreview]:
     """Return a preview of each submission of an upload. Raises NotFound."""
-    secret, hidden = load_secret(service.store).sha256, load_names_for_actor(service, actor, course_id)
+    secret, hidden_names = load_secret(service.store).sha256, load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        foreseen = preflight.preview_intake(session, course_id, contents.grading_requests, secret, hidden.assignments)
+        intake_previews = preflight.preview_intake(
+            session, course_id, contents.grading_requests, secret, hidden_names.assignments
+        )
         names = {each.id: each.name for each in membership.list_members(session, course_id)}
     return [
         SubmissionPreview(asked, _find_student_name(asked, names), ahead)
-        for asked, ahead in zip(contents.grading_requests, foreseen, strict=True)
+        for asked, ahead in zip(contents.grading_requests, intake_previews, strict=True)
     ]
 
 
@@ -215,10 +223,10 @@ def pause(service: Service, actor: Actor, course_id: int, batch_id: str) -> Batc
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        done = batch_control.pause_batch(session, batch_id)
-        if done.changed:
+        result = batch_control.pause_batch(session, batch_id)
+        if result.changed:
             audit.record_action(session, actor.name, "pause", "batch", batch_id)
-        return done
+        return result
 
 
 def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> BatchControlResult:
@@ -228,9 +236,9 @@ def resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Bat
         NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: The batch was cancelled, or consists of web submissions.
     """
-    done = _resume(service, actor, course_id, batch_id)
-    service.notifier.grade(JobQueue.BATCH, done.waiting)
-    return done
+    result = _resume(service, actor, course_id, batch_id)
+    service.notifier.grade(JobQueue.BATCH, result.waiting)
+    return result
 
 
 @retry_conflicts
@@ -244,12 +252,12 @@ def cancel(service: Service, actor: Actor, course_id: int, batch_id: str) -> Bat
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        done = batch_control.cancel_batch(session, batch_id)
-        if done.changed:
+        result = batch_control.cancel_batch(session, batch_id)
+        if result.changed:
             audit.record_action(
-                session, actor.name, "cancel", "batch", batch_id, not_begun=done.waiting, stopped=done.running
+                session, actor.name, "cancel", "batch", batch_id, not_begun=result.waiting, stopped=result.running
             )
-        return done
+        return result
 
 
 def retry(service: Service, actor: Actor, course_id: int, batch_id: str) -> RetryCounts:
@@ -273,29 +281,35 @@ def retry_dead(service: Service, actor: Actor, batch_id: str | None) -> RetryCou
 
 
 def _build_rejection_error(refusals: Sequence[RejectedSubmission]) -> UsageError:
-    first = refusals[0].sentence if refusals else "there are none"
-    return UsageError(f"none of {len(refusals)} submissions can be accepted; {first}")
+    first_sentence = refusals[0].sentence if refusals else "there are none"
+    return UsageError(f"none of {len(refusals)} submissions can be accepted; {first_sentence}")
 
 
-def _record_submission(actor: str, refused: int, session: Session, accepted: BatchIntake) -> None:
-    if accepted.batch is not None:
-        counts = {"submissions": len(accepted.batch.jobs), "refused": refused + len(accepted.refused)}
-        audit.record_action(session, actor, "submit", "batch", accepted.batch.id, **counts, known=len(accepted.known))
+def _record_submission(actor: str, refusal_count: int, session: Session, batch_intake: BatchIntake) -> None:
+    if batch_intake.batch is not None:
+        counts = {"submissions": len(batch_intake.batch.jobs), "refused": refusal_count + len(batch_intake.refused)}
+        audit.record_action(
+            session, actor, "submit", "batch", batch_intake.batch.id, **counts, known=len(batch_intake.known)
+        )
 
 
-def _hide_names(accepted: BatchIntake, refusals: tuple[RejectedSubmission, ...], hidden: HiddenNames) -> SubmittedBatch:
-    batch = accepted.batch
+def _hide_names(
+    batch_intake: BatchIntake, refusals: tuple[RejectedSubmission, ...], hidden_names: HiddenNames
+) -> SubmittedBatch:
+    batch = batch_intake.batch
     if batch is not None:
-        jobs = (replace(job, student=hidden.label_student(job.assignment, job.student)) for job in batch.jobs)
+        jobs = (replace(job, student=hidden_names.label_student(job.assignment, job.student)) for job in batch.jobs)
         batch = replace(batch, jobs=tuple(jobs))
-    known = (replace(each, student=hidden.label_student(each.assignment, each.student)) for each in accepted.known)
-    return SubmittedBatch(batch, tuple(known), refusals, accepted.refused)
+    known_jobs = (
+        replace(each, student=hidden_names.label_student(each.assignment, each.student)) for each in batch_intake.known
+    )
+    return SubmittedBatch(batch, tuple(known_jobs), refusals, batch_intake.refused)
 
 
-def _find_student_name(asked: GradingRequest, names: Mapping[str, str]) -> str:
+def _find_student_name(grading_request: GradingRequest, names: Mapping[str, str]) -> str:
     """Return the student's name if it differs from the id: from the batch, otherwise from the course."""
-    name = asked.student.name if asked.student.name != asked.student.id else ""
-    return name or names.get(asked.submission.student, "")
+    name = grading_request.student.name if grading_request.student.name != grading_request.student.id else ""
+    return name or names.get(grading_request.submission.student, "")
 
 
 @retry_conflicts
@@ -303,10 +317,10 @@ def _resume(service: Service, actor: Actor, course_id: int, batch_id: str) -> Ba
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        done = batch_control.resume_batch(session, batch_id)
-        if done.changed:
+        result = batch_control.resume_batch(session, batch_id)
+        if result.changed:
             audit.record_action(session, actor.name, "resume", "batch", batch_id)
-        return done
+        return result
 
 
 @retry_conflicts
@@ -320,14 +334,14 @@ def _retry(service: Service, actor: Actor, course_id: int | None, batch_id: str 
         else:
             require_course(session, actor, course_id, Role.INSTRUCTOR)
             require_batch(session, course_id, batch_id or "")
-        done = batch_control.retry_dead_jobs(session, batch_id)
-        if done.queued:
-            audit.record_action(session, actor.name, "retry", "batch", batch_id or "all", queued=done.queued)
-        return done
+        retry_counts = batch_control.retry_dead_jobs(session, batch_id)
+        if retry_counts.queued:
+            audit.record_action(session, actor.name, "retry", "batch", batch_id or "all", queued=retry_counts.queued)
+        return retry_counts
 
 
-def _notify_workers(service: Service, done: RetryCounts) -> RetryCounts:
+def _notify_workers(service: Service, retry_counts: RetryCounts) -> RetryCounts:
     # Each job returns to its own queue; extra notifications are harmless.
     for lane in JobQueue:
-        service.notifier.grade(lane, done.queued)
-    return done
+        service.notifier.grade(lane, retry_counts.queued)
+    return retry_counts

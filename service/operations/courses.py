@@ -121,21 +121,23 @@ def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedM
     check_operator(actor)
     if request.operator and not actor.is_machine:
         raise Forbidden("operators can be added only with a command on the server")
-    course, who = request.course.strip(), Student(request.id.strip(), request.name.strip(), request.email.strip())
-    if not course or not who.id:
+    course, student = request.course.strip(), Student(request.id.strip(), request.name.strip(), request.email.strip())
+    if not course or not student.id:
         raise Invalid("names of courses and members must contain visible characters")
     if len(course) > LONGEST_NAME:
         raise Invalid("the course name is too long; use at most %(most)s characters", most=LONGEST_NAME)
-    check_lengths([who])
+    check_lengths([student])
     is_student = request.role is Role.STUDENT
     if is_student:
         find(service, actor, course)
     with service.store.transaction() as session:
-        member = (membership.make_student if is_student else membership.make_instructor)(session, course, who)
+        member = (membership.make_student if is_student else membership.make_instructor)(session, course, student)
         if request.operator:
             membership.make_operator(session, member.person_id)
         detail = {"role": member.role.value, "operator": request.operator}
         audit.record_action(session, actor.name, "add", "person", str(member.person_id), **detail)
         secret = make_link(session, actor, member.person_id, word=request.word)
-        elsewhere = () if is_student else tuple(membership.find_same_id_instructors(session, member.enrolment_id))
-    return AddedMember(member, secret, elsewhere)
+        same_id_instructors = (
+            () if is_student else tuple(membership.find_same_id_instructors(session, member.enrolment_id))
+        )
+    return AddedMember(member, secret, same_id_instructors)

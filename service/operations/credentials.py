@@ -45,7 +45,7 @@ def make_token(service: Service, actor: Actor, request: TokenRequest) -> None:
             request.word,
             name=request.name,
             reach=reach,
-            made_with=actor.credential_id,
+            parent_token_id=actor.credential_id,
         )
         audit.record_action(session, actor.name, "token", "person", str(person_id), scopes=sorted(request.scopes))
 
@@ -75,18 +75,18 @@ def end_other_credentials(service: Service, actor: Actor) -> int:
     """End all credentials of the actor except the one in use. Returns the number ended."""
     person_id = _require_person_id(actor)
     with service.store.transaction() as session:
-        ended = credentials.revoke_all(session, person_id, but=actor.credential_id, reach=actor.reach)
-        audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=ended)
-    return ended
+        ended_count = credentials.revoke_all(session, person_id, kept_id=actor.credential_id, reach=actor.reach)
+        audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=ended_count)
+    return ended_count
 
 
 def check_scopes(
     scopes: frozenset[str], roles: list[Role], *, operator: bool, limit: frozenset[str] = Reach().scopes
 ) -> None:
     """Raise Invalid unless a person with these roles can use the scopes. An empty ``limit`` means no limit."""
-    offered = list_offered_scopes(roles, operator=operator, limit=limit or None)
-    if not scopes or not scopes <= offered.keys():
-        raise Invalid("Select at least one of these scopes: %(scopes)s.", scopes=", ".join(offered))
+    offered_scopes = list_offered_scopes(roles, operator=operator, limit=limit or None)
+    if not scopes or not scopes <= offered_scopes.keys():
+        raise Invalid("Select at least one of these scopes: %(scopes)s.", scopes=", ".join(offered_scopes))
 
 
 def check_token_count(session: Session, person_id: int) -> None:

@@ -88,82 +88,89 @@ def export(
         NotFound: The course does not have the batch, or the actor does not instruct it.
         Invalid: The format is unknown, does not match the worksheet, or requires hidden names.
     """
-    chosen = _require_format(request)
-    hidden = load_names_for_actor(service, actor, course_id)
+    export_format = _require_format(request)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        lines = batches.load_job_lines(session, batch_id, hidden)
+        lines = batches.load_job_lines(session, batch_id, hidden_names)
         refusals = batches.load_batch(session, batch_id).refusals
-        waiting = publishing.count_unpublished_regrades(session, batch_id)
-    nameless = sorted({line.assignment for line in lines} & hidden.assignments)
-    if nameless and (chosen.archive is not None or chosen.worksheet is not None):
+        unpublished_count = publishing.count_unpublished_regrades(session, batch_id)
+    hidden_assignments = sorted({line.assignment for line in lines} & hidden_names.assignments)
+    if hidden_assignments and (export_format.archive is not None or export_format.worksheet is not None):
         raise Invalid(
             "%(form)s needs student names, but names are hidden for %(assignment)s; show the names first",
             form=request.form,
-            assignment=nameless[0],
+            assignment=hidden_assignments[0],
         )
-    released = [line for line in lines if not describe_missing_grade(line, published=request.published)]
+    released_lines = [line for line in lines if not describe_missing_grade(line, published=request.published)]
     text, files = "", list[tuple[str, str]]()
-    left_over: Sequence[str] = ()
-    if chosen.archive is not None:
-        left_over = chosen.archive(render_report_pages(service.store, released, refusals), sink or io.BytesIO())
+    unmatched_names: Sequence[str] = ()
+    if export_format.archive is not None:
+        unmatched_names = export_format.archive(
+            render_report_pages(service.store, released_lines, refusals), sink or io.BytesIO()
+        )
     else:
         rows = build_rows(service.store, lines, refusals, published=request.published)
-        if chosen.worksheet is not None:
-            filled = chosen.worksheet(rows, request.worksheet or "")
-            text, left_over = filled.text, filled.left_over
-        elif chosen.table is None or (request.one_each and chosen.document is not None):
-            files = _render_files(chosen, rows)
+        if export_format.worksheet is not None:
+            filled_worksheet = export_format.worksheet(rows, request.worksheet or "")
+            text, unmatched_names = filled_worksheet.text, filled_worksheet.left_over
+        elif export_format.table is None or (request.one_each and export_format.document is not None):
+            files = _render_files(export_format, rows)
         else:
-            text = chosen.table(rows)
+            text = export_format.table(rows)
     return Export(
         text,
         tuple(files),
-        tuple(left_over),
+        tuple(unmatched_names),
         tuple(each for each in lines if _is_for_staff(each)),
-        tuple(each for each in released if each.unjudged),
-        waiting,
+        tuple(each for each in released_lines if each.unjudged),
+        unpublished_count,
     )
 
 
 def download(service: Service, actor: Actor, course_id: int, batch_id: str, request: ExportRequest) -> Download:
     """Export as a single file; several files are zipped. Raises like ``export``."""
-    chosen, sink = _require_format(request), io.BytesIO()
-    found = export(service, actor, course_id, batch_id, request, sink)
-    suffix, data = chosen.suffix, sink.getvalue() if chosen.archive is not None else found.text.encode()
-    if chosen.archive is None and chosen.worksheet is None and chosen.table is None:
-        suffix, data = ".zip", _zip_files(found.files)
+    export_format, sink = _require_format(request), io.BytesIO()
+    exported = export(service, actor, course_id, batch_id, request, sink)
+    suffix, data = (
+        export_format.suffix,
+        sink.getvalue() if export_format.archive is not None else exported.text.encode(),
+    )
+    if export_format.archive is None and export_format.worksheet is None and export_format.table is None:
+        suffix, data = ".zip", _zip_files(exported.files)
     with service.store.reading() as session:
         name = batches.load_batch(session, batch_id).name
     return Download(f"{sanitise_name(name) or batch_id}-{request.form}{suffix}", _TYPES[suffix], data)
 
 
 def _require_format(request: ExportRequest) -> Format:
-    chosen = FORMATS.get(request.form)
-    if chosen is None or (chosen.worksheet is not None) != (request.worksheet is not None):
-        others = sorted(name for name, each in FORMATS.items() if each.worksheet is None)
-        raise Invalid("expected one of the formats %(formats)s, or a worksheet to fill in", formats=", ".join(others))
-    return chosen
+    export_format = FORMATS.get(request.form)
+    if export_format is None or (export_format.worksheet is not None) != (request.worksheet is not None):
+        table_formats = sorted(name for name, each in FORMATS.items() if each.worksheet is None)
+        raise Invalid(
+            "expected one of the formats %(formats)s, or a worksheet to fill in", formats=", ".join(table_formats)
+        )
+    return export_format
 
 
 def _is_for_staff(line: JobLine) -> bool:
     return current_grades.is_trusted(line) and not current_grades.is_for_students(line)
 
 
-def _render_files(chosen: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
+def _render_files(export_format: Format, rows: Sequence[TableRow[Grade]]) -> list[tuple[str, str]]:
     """Return a file for each grade, and for each rejection if the format supports them.
 
     Files are named after the student, and after the assignment if a student has several.
     """
-    graded = [(row, row.grade) for row in rows if row.grade is not None]
-    stems = build_file_stems([(row.student.id, row.assignment) for row, _ in graded])
-    texts = [] if chosen.document is None else [chosen.document(grade) for _, grade in graded]
-    if chosen.refusal is not None:
-        refused = [row for row in rows if row.refused]
-        texts += map(chosen.refusal, refused)
-        stems += build_refused_stems([(row.source, row.student.id) for row in refused])
-    return [(f"{stem}{chosen.suffix}", text) for stem, text in zip(stems, texts, strict=True)]
+    graded_rows = [(row, row.grade) for row in rows if row.grade is not None]
+    stems = build_file_stems([(row.student.id, row.assignment) for row, _ in graded_rows])
+    texts = [] if export_format.document is None else [export_format.document(grade) for _, grade in graded_rows]
+    if export_format.refusal is not None:
+        refused_rows = [row for row in rows if row.refused]
+        texts += map(export_format.refusal, refused_rows)
+        stems += build_refused_stems([(row.source, row.student.id) for row in refused_rows])
+    return [(f"{stem}{export_format.suffix}", text) for stem, text in zip(stems, texts, strict=True)]
 
 
 def _zip_files(files: Sequence[tuple[str, str]]) -> bytes:

@@ -61,35 +61,35 @@ class SubmittedFiles:
 
 def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> JobLine:
     """Return the state of one grading. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         _require_course_job(session, actor, course_id, job_id)
-        return batches.load_job_line(session, job_id).hide_name(hidden)
+        return batches.load_job_line(session, job_id).hide_name(hidden_names)
 
 
 def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> GradeView:
     """Return one grade with the data of its page. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         row = _require_course_job(session, actor, course_id, job_id)
-        whole = batches.load_job_line(session, job_id)
-        line = whole.hide_name(hidden)
+        named_line = batches.load_job_line(session, job_id)
+        line = named_line.hide_name(hidden_names)
         change = regrades.load_change(session, job_id)
         gradings = regrades.load_gradings(session, row.submission_id)
         attempts = own_gradings.list_newest_gradings(session, row.enrolment_id, line.assignment)
         view = _load_staff_view(session, line, language) if line.state is JobState.DONE else None
         history = audit.load_entries(session, "job", job_id)
-        beside = _find_neighbours(session, row, hidden)
-    report = None if view is None else render_report_body(service.store, whole.id, whole.plots, view)
-    put_aside = line.state is JobState.CANCELLED and line.cancelled_for is CancelReason.OVER_LIMIT
-    return GradeView(line, row.batch_id, report, change, gradings, attempts, history, put_aside, beside)
+        neighbours = _find_neighbours(session, row, hidden_names)
+    report = None if view is None else render_report_body(service.store, named_line.id, named_line.plots, view)
+    is_put_aside = line.state is JobState.CANCELLED and line.cancelled_for is CancelReason.OVER_LIMIT
+    return GradeView(line, row.batch_id, report, change, gradings, attempts, history, is_put_aside, neighbours)
 
 
 def show_neighbours(service: Service, actor: Actor, course_id: int, job_id: str) -> Neighbours:
     """Return the previous and next grade in the order of the table that the actor sees. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        return _find_neighbours(session, _require_course_job(session, actor, course_id, job_id), hidden)
+        return _find_neighbours(session, _require_course_job(session, actor, course_id, job_id), hidden_names)
 
 
 def show_result(service: Service, actor: Actor, course_id: int, job_id: str) -> View:
@@ -112,11 +112,11 @@ def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
     """Return the submitted files, which can name the student. Raises NotFound, also if names are hidden."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         row = require_submission(session, course_id, submission_id)
-        if row.assignment in hidden.assignments:
+        if row.assignment in hidden_names.assignments:
             raise NotFound("There is no such page or item, or you have no access to it.")
         return SubmittedFiles(row.packed, f"submission-{row.id}.zip")
 
@@ -132,23 +132,23 @@ def _require_course_job(session: Session, actor: Actor, course_id: int, job_id: 
     return require_job(session, course_id, job_id)
 
 
-def _find_neighbours(session: Session, row: Job, hidden: HiddenNames) -> Neighbours:
+def _find_neighbours(session: Session, row: Job, hidden_names: HiddenNames) -> Neighbours:
     if row.batch_id is None:
         return Neighbours()
-    ids = [line.id for line in batch_table.load_table_lines(session, row.batch_id, (), hidden) if line.id]
-    if row.id not in ids:
+    job_ids = [line.id for line in batch_table.load_table_lines(session, row.batch_id, (), hidden_names) if line.id]
+    if row.id not in job_ids:
         return Neighbours()
-    place = ids.index(row.id)
-    return Neighbours(ids[place - 1] if place else "", ids[place + 1] if place + 1 < len(ids) else "")
+    index = job_ids.index(row.id)
+    return Neighbours(job_ids[index - 1] if index else "", job_ids[index + 1] if index + 1 < len(job_ids) else "")
 
 
 def _load_result(
     service: Service, actor: Actor, course_id: int, job_id: str, language: Language
 ) -> tuple[JobLine, View]:
-    hidden: HiddenNames = load_names_for_actor(service, actor, course_id)
+    hidden_names: HiddenNames = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         _require_course_job(session, actor, course_id, job_id)
-        line = batches.load_job_line(session, job_id).hide_name(hidden)
+        line = batches.load_job_line(session, job_id).hide_name(hidden_names)
         if line.state is not JobState.DONE:
             raise NotFound("There is no such page or item, or you have no access to it.")
         return line, _load_staff_view(session, line, language)

@@ -59,10 +59,10 @@ class Marking:
 
 def show_marking(service: Service, actor: Actor, course_id: int, job_id: str) -> Marking:
     """Return the overrides and comments of a grade, with the grader's own marks. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         _require_course_job(session, actor, course_id, job_id)
-        return _load_marking(session, job_id, hidden)
+        return _load_marking(session, job_id, hidden_names)
 
 
 def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, request: MarksRequest) -> Marking:
@@ -73,22 +73,22 @@ def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, reque
         Conflict: The submission is not graded, or the marks changed after the actor read them.
         UsageError: The criterion is unknown, the marks are out of range, or the reason is missing.
     """
-    wanted = overrides.parse_marks(request.marks) if isinstance(request.marks, str) else request.marks
+    new_marks = overrides.parse_marks(request.marks) if isinstance(request.marks, str) else request.marks
 
     def change(session: Session) -> None:
-        asked = (session, job_id, request.criterion)
-        if wanted is None:
-            overrides.excuse_criterion(*asked, request.reason, actor.name, seen=request.seen)
+        criterion_key = (session, job_id, request.criterion)
+        if new_marks is None:
+            overrides.excuse_criterion(*criterion_key, request.reason, actor.name, expected_override=request.seen)
         else:
-            overrides.set_marks(*asked, wanted, request.reason, actor.name, seen=request.seen)
+            overrides.set_marks(*criterion_key, new_marks, request.reason, actor.name, expected_override=request.seen)
 
     return _change_marks(service, actor, course_id, job_id, change)
 
 
 def withdraw_override(
-    service: Service, actor: Actor, course_id: int, job_id: str, criterion: str, seen: int | None = None
+    service: Service, actor: Actor, course_id: int, job_id: str, criterion: str, expected_override: int | None = None
 ) -> Marking:
-    """Restore the grader's marks of a criterion; ``seen`` as in ``MarksRequest``.
+    """Restore the grader's marks of a criterion; ``expected_override`` as in ``MarksRequest``.
 
     Raises:
         NotFound: The grade does not exist for the actor.
@@ -97,7 +97,7 @@ def withdraw_override(
     """
 
     def change(session: Session) -> None:
-        overrides.withdraw_override(session, job_id, criterion, actor.name, seen=seen)
+        overrides.withdraw_override(session, job_id, criterion, actor.name, expected_override=expected_override)
 
     return _change_marks(service, actor, course_id, job_id, change)
 
@@ -148,17 +148,17 @@ def _change_marks(
 def _apply_change(
     service: Service, actor: Actor, course_id: int, job_id: str, change: Callable[[Session], None]
 ) -> Marking:
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.transaction() as session:
         _require_course_job(session, actor, course_id, job_id)
         change(session)
-        return _load_marking(session, job_id, hidden)
+        return _load_marking(session, job_id, hidden_names)
 
 
-def _load_marking(session: Session, job_id: str, hidden: HiddenNames) -> Marking:
+def _load_marking(session: Session, job_id: str, hidden_names: HiddenNames) -> Marking:
     row = session.get_one(Job, job_id)
     return Marking(
-        batches.load_job_line(session, job_id).hide_name(hidden),
+        batches.load_job_line(session, job_id).hide_name(hidden_names),
         session.get_one(AssignmentVersion, row.assignment_version_id).title,
         overrides.load_criterion_marks(session, job_id),
         comments.load_comments(session, job_id),

@@ -66,9 +66,11 @@ def begin(service: Service, request: LaunchRequest) -> StartedLaunch:
         )
     with service.store.transaction() as session:
         state, nonce = lti.begin_launch(session, platform, request.target)
-    back = f"{request.address}/lti/launch"
-    where = launch.build_authorization_url(platform, back, request.login_hint, request.message_hint, state, nonce)
-    return StartedLaunch(state, where)
+    return_url = f"{request.address}/lti/launch"
+    authorization_url = launch.build_authorization_url(
+        platform, return_url, request.login_hint, request.message_hint, state, nonce
+    )
+    return StartedLaunch(state, authorization_url)
 
 
 def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
@@ -80,29 +82,31 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
         PlatformError: The platform's keys cannot be fetched.
     """
     with service.store.transaction() as session:
-        pending = lti.take_launch(session, state)
-    if pending is None:
+        pending_launch = lti.take_launch(session, state)
+    if pending_launch is None:
         raise Invalid("this launch has expired or was already used; open the link in the course again")
-    told = launch.read_launch(pending, id_token)
+    claims = launch.read_launch(pending_launch, id_token)
     with service.store.transaction() as session:
-        launched = lti.resolve_launch(
+        resolved_launch = lti.resolve_launch(
             session,
-            pending.platform,
-            told.deployment,
-            told.context,
-            told.course_title,
-            told.subject,
-            told.student,
-            told.role,
-            told.members_url,
-            told.lineitems_url,
+            pending_launch.platform,
+            claims.deployment,
+            claims.context,
+            claims.course_title,
+            claims.subject,
+            claims.student,
+            claims.role,
+            claims.members_url,
+            claims.lineitems_url,
         )
-        if launched is None:
+        if resolved_launch is None:
             raise Invalid(
                 "no instructor has opened Robomark from this course yet; ask your instructor to open it first"
             )
         # A platform identifies people in its own courses only.
-        kind, reach = CredentialKind.SESSION, Reach(platform_id=pending.platform.id)
-        secret = credentials.issue_credential(session, launched.person_id, kind, SESSION_LIFETIME, reach=reach)
-        audit.record_action(session, f"platform {pending.platform.name}", "launch", "person", str(launched.person_id))
-    return CompletedLaunch(NewSession(secret), launched, pending.target)
+        kind, reach = CredentialKind.SESSION, Reach(platform_id=pending_launch.platform.id)
+        secret = credentials.issue_credential(session, resolved_launch.person_id, kind, SESSION_LIFETIME, reach=reach)
+        audit.record_action(
+            session, f"platform {pending_launch.platform.name}", "launch", "person", str(resolved_launch.person_id)
+        )
+    return CompletedLaunch(NewSession(secret), resolved_launch, pending_launch.target)

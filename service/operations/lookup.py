@@ -35,10 +35,10 @@ def require_course(session: Session, actor: Actor, course_id: int, *roles: Role)
     Raises:
         NotFound: The course does not exist, or the actor has none of the roles in it.
     """
-    found = session.get(Course, course_id)
-    if found is None or not (actor.is_machine or actor.roles.get(course_id) in roles):
+    course = session.get(Course, course_id)
+    if course is None or not (actor.is_machine or actor.roles.get(course_id) in roles):
         raise _build_not_found()
-    return found
+    return course
 
 
 def require_named_course(session: Session, actor: Actor, name: str) -> Course:
@@ -48,10 +48,10 @@ def require_named_course(session: Session, actor: Actor, name: str) -> Course:
         NotFound: The course does not exist, or the actor is not an operator.
     """
     check_operator(actor)
-    found = session.scalars(select(Course).where(Course.name == name)).one_or_none()
-    if found is None:
+    course = session.scalars(select(Course).where(Course.name == name)).one_or_none()
+    if course is None:
         raise NotFound("there is no course called %(name)s", name=repr(name))
-    return found
+    return course
 
 
 def require_batch(session: Session, course_id: int, batch_id: str) -> Batch:
@@ -107,8 +107,8 @@ def require_student(session: Session, actor: Actor, course_id: int, enrolment_id
 
 def require_own_enrolment(session: Session, actor: Actor, course_id: int, *roles: Role) -> Enrolment:
     """Return the actor's enrolment in a course, in which they have one of these roles. Raises NotFound."""
-    mine = (Enrolment.course_id == course_id, Enrolment.person_id == actor.person_id)
-    row = session.scalars(select(Enrolment).where(*mine)).one_or_none()
+    conditions = (Enrolment.course_id == course_id, Enrolment.person_id == actor.person_id)
+    row = session.scalars(select(Enrolment).where(*conditions)).one_or_none()
     if row is None or actor.roles.get(course_id) not in roles:
         raise _build_not_found()
     return row

@@ -96,15 +96,15 @@ class Allowance:
         """Return whether no new submission can count."""
         return self.attempts_left == 0 or self.date_over
 
-    def hours_late(self, found: OwnSubmission) -> int | None:
+    def hours_late(self, submission: OwnSubmission) -> int | None:
         """Return the whole hours that a submission is late.
 
         None if it is on time or a day or more late, or if its due date has moved since.
         """
-        if found.days_late != 1 or self.limits.due_at is None or found.submitted_at <= self.limits.due_at:
+        if submission.days_late != 1 or self.limits.due_at is None or submission.submitted_at <= self.limits.due_at:
             return None
-        late = found.submitted_at - self.limits.due_at
-        return late // timedelta(hours=1) if late < timedelta(days=1) else None
+        delay = submission.submitted_at - self.limits.due_at
+        return delay // timedelta(hours=1) if delay < timedelta(days=1) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,20 +130,26 @@ class OwnAttempts:
 
 def load_own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
     """Return the assignments that are open to a student or that they submitted to: open ones first, by due date."""
-    found = _load_submissions(
+    submissions = _load_submissions(
         session, _select_submissions(enrolment_id).where(or_(_is_counting(enrolment_id), _is_newest(enrolment_id)))
     )
-    newest = {each.assignment: each for each in sorted(found, key=lambda each: each.attempt)}
-    counting = {each.assignment: each for each in found if each.counts}
-    asked = appeals.load_newest_appeals(session, enrolment_id)
-    prepared = open_assignments.list_assignments(session, course_id)
-    titles = {each.assignment: each.title for each in prepared if each.open}
+    newest_submissions = {each.assignment: each for each in sorted(submissions, key=lambda each: each.attempt)}
+    counting_submissions = {each.assignment: each for each in submissions if each.counts}
+    newest_appeals = appeals.load_newest_appeals(session, enrolment_id)
+    course_assignments = open_assignments.list_assignments(session, course_id)
+    titles = {each.assignment: each.title for each in course_assignments if each.open}
     is_open = frozenset(titles)
-    titles = {name: each.title for name, each in newest.items()} | titles
-    allowed = compute_allowances(session, enrolment_id, titles)
+    titles = {name: each.title for name, each in newest_submissions.items()} | titles
+    allowances = compute_allowances(session, enrolment_id, titles)
     lines = [
         OwnAssignment(
-            name, title, name in is_open, allowed[name], newest.get(name), counting.get(name), asked.get(name)
+            name,
+            title,
+            name in is_open,
+            allowances[name],
+            newest_submissions.get(name),
+            counting_submissions.get(name),
+            newest_appeals.get(name),
         )
         for name, title in titles.items()
     ]
@@ -163,11 +169,13 @@ def find_submission_with_attempts(
 ) -> tuple[OwnSubmission, OwnAttempts] | None:
     """Return a student's submission and all their submissions to its assignment; None if they do not have it."""
     row = aliased(SubmissionRow)
-    own = (row.id == submission_id, row.enrolment_id == enrolment_id)
-    assignment = select(row.assignment).where(*own).scalar_subquery()
-    found = _load_submissions(session, _select_attempts(enrolment_id, assignment, SubmissionRow.id == submission_id))
-    this = next((each for each in found if each.id == submission_id), None)
-    return None if this is None else (this, _build_attempts(found))
+    conditions = (row.id == submission_id, row.enrolment_id == enrolment_id)
+    assignment = select(row.assignment).where(*conditions).scalar_subquery()
+    submissions = _load_submissions(
+        session, _select_attempts(enrolment_id, assignment, SubmissionRow.id == submission_id)
+    )
+    submission = next((each for each in submissions if each.id == submission_id), None)
+    return None if submission is None else (submission, _build_attempts(submissions))
 
 
 def load_submissions_before(
@@ -182,8 +190,8 @@ def load_submissions_before(
 
 def find_own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
     """Return a student's submission; None if they do not have it."""
-    found = _load_submissions(session, _select_submissions(enrolment_id).where(SubmissionRow.id == submission_id))
-    return found[0] if found else None
+    submissions = _load_submissions(session, _select_submissions(enrolment_id).where(SubmissionRow.id == submission_id))
+    return submissions[0] if submissions else None
 
 
 def compute_allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
@@ -193,14 +201,14 @@ def compute_allowance(session: Session, enrolment_id: int, assignment: str) -> A
 
 def compute_allowances(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, Allowance]:
     """Return ``allowance`` for several assignments, with the same number of statements."""
-    limits, at = policies.load_limits_by_assignment(session, enrolment_id, assignments), now(session)
-    made = policies.count_attempts(session, enrolment_id, assignments)
+    limits, current_time = policies.load_limits_by_assignment(session, enrolment_id, assignments), now(session)
+    attempt_counts = policies.count_attempts(session, enrolment_id, assignments)
     return {
         each: Allowance(
             limits[each],
-            made[each],
-            None if (due_at := limits[each].due_at) is None else due_at - at,
-            None if (closed_at := limits[each].closed_at) is None else closed_at - at,
+            attempt_counts[each],
+            None if (due_at := limits[each].due_at) is None else due_at - current_time,
+            None if (closed_at := limits[each].closed_at) is None else closed_at - current_time,
         )
         for each in assignments
     }
@@ -214,16 +222,18 @@ def _select_attempts(
 ) -> _SubmissionSelect:
     """Return a query for the newest submissions to an assignment, the one that counts, and those matching ``also``."""
     row = aliased(SubmissionRow)
-    newest = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
-    some = or_(
-        SubmissionRow.id.in_(newest.order_by(row.attempt.desc()).limit(MOST_SHOWN)), _is_counting(enrolment_id), *also
+    newest_ids = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
+    is_included = or_(
+        SubmissionRow.id.in_(newest_ids.order_by(row.attempt.desc()).limit(MOST_SHOWN)),
+        _is_counting(enrolment_id),
+        *also,
     )
-    query = _select_submissions(enrolment_id).where(SubmissionRow.assignment == assignment, some)
+    query = _select_submissions(enrolment_id).where(SubmissionRow.assignment == assignment, is_included)
     return query.order_by(SubmissionRow.attempt.desc())
 
 
-def _build_attempts(found: list[OwnSubmission]) -> OwnAttempts:
-    return OwnAttempts(found[:MOST_SHOWN], next((each for each in found if each.counts), None))
+def _build_attempts(submissions: list[OwnSubmission]) -> OwnAttempts:
+    return OwnAttempts(submissions[:MOST_SHOWN], next((each for each in submissions if each.counts), None))
 
 
 def _is_counting(enrolment_id: int) -> ColumnElement[bool]:
@@ -234,24 +244,24 @@ def _is_counting(enrolment_id: int) -> ColumnElement[bool]:
 def _is_newest(enrolment_id: int) -> ColumnElement[bool]:
     """Return the condition that a student's ``SubmissionRow`` is the newest to its assignment."""
     row = aliased(SubmissionRow)
-    newest = (
+    newest_attempt = (
         select(row.assignment, func.max(row.attempt))
         .join(Job, Job.submission_id == row.id)
         .where(row.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
         .group_by(row.assignment)
     )
-    return tuple_(SubmissionRow.assignment, SubmissionRow.attempt).in_(newest)
+    return tuple_(SubmissionRow.assignment, SubmissionRow.attempt).in_(newest_attempt)
 
 
 def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
-    earlier = aliased(SubmissionRow)
-    same_as = (
-        select(func.min(earlier.attempt))
+    earlier_submission = aliased(SubmissionRow)
+    same_attempt = (
+        select(func.min(earlier_submission.attempt))
         .where(
-            earlier.enrolment_id == SubmissionRow.enrolment_id,
-            earlier.assignment == SubmissionRow.assignment,
-            earlier.sha256 == SubmissionRow.sha256,
-            earlier.attempt < SubmissionRow.attempt,
+            earlier_submission.enrolment_id == SubmissionRow.enrolment_id,
+            earlier_submission.assignment == SubmissionRow.assignment,
+            earlier_submission.sha256 == SubmissionRow.sha256,
+            earlier_submission.attempt < SubmissionRow.attempt,
         )
         .scalar_subquery()
     )
@@ -261,7 +271,7 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
             Job,
             AssignmentVersion.title,
             Batch.state,
-            same_as,
+            same_attempt,
             and_(*current_grades.CAN_COUNT),
             _is_counting(enrolment_id),
         )
@@ -273,22 +283,33 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
 
 
 def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSubmission]:
-    found = [_build_submission(*row) for row in session.execute(query)]
-    shown = [each.job_id for each in found if each.shown]
-    marked, released = results.load_marks(session, shown), policies.load_visibilities_by_job(session, shown)
+    submissions = [_build_submission(*row) for row in session.execute(query)]
+    visible_job_ids = [each.job_id for each in submissions if each.shown]
+    grades_by_job, visibilities_by_job = (
+        results.load_marks(session, visible_job_ids),
+        policies.load_visibilities_by_job(session, visible_job_ids),
+    )
     return [
-        _add_marks(each, marked[each.job_id], released[each.job_id]) if each.job_id in marked else each
-        for each in found
+        _add_marks(each, grades_by_job[each.job_id], visibilities_by_job[each.job_id])
+        if each.job_id in grades_by_job
+        else each
+        for each in submissions
     ]
 
 
-def _add_marks(found: OwnSubmission, grade: Grade, released: frozenset[str]) -> OwnSubmission:
-    seen = build_student_view(grade, released).grade
-    return replace(found, marks=seen.marks, max_marks=seen.max_marks, released=released)
+def _add_marks(submission: OwnSubmission, grade: Grade, visibilities: frozenset[str]) -> OwnSubmission:
+    visible_grade = build_student_view(grade, visibilities).grade
+    return replace(submission, marks=visible_grade.marks, max_marks=visible_grade.max_marks, released=visibilities)
 
 
 def _build_submission(
-    row: SubmissionRow, job: Job, title: str, batch: BatchState | None, same_as: int | None, shown: bool, counts: bool
+    row: SubmissionRow,
+    job: Job,
+    title: str,
+    batch: BatchState | None,
+    same_as: int | None,
+    is_shown: bool,
+    counts: bool,
 ) -> OwnSubmission:
     return OwnSubmission(
         id=row.id,
@@ -308,7 +329,7 @@ def _build_submission(
         superseded=job.cancelled_for is CancelReason.SUPERSEDED,
         published=job.published_at is not None,
         plots=job.plots,
-        shown=shown,
+        shown=is_shown,
         counts=counts,
     )
 

@@ -77,15 +77,19 @@ def list_assignments(service: Service, actor: Actor, course_id: int) -> list[Own
 
 
 def list_opened(
-    service: Service, actor: Actor, course_id: int, *, limit: int, after: str = ""
+    service: Service, actor: Actor, course_id: int, *, limit: int, last_assignment: str = ""
 ) -> list[tuple[CourseAssignment, Allowance]]:
     """Return at most ``limit`` opened assignments of a course, ordered by id, after this one. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
-        opened = [each for each in open_assignments.list_assignments(session, course_id) if each.opened_at is not None]
-        some = [each for each in opened if each.assignment > after][:limit]
-        allowed = own_submissions.compute_allowances(session, enrolment_id, [each.assignment for each in some])
-        return [(each, allowed[each.assignment]) for each in some]
+        opened_assignments = [
+            each for each in open_assignments.list_assignments(session, course_id) if each.opened_at is not None
+        ]
+        page_assignments = [each for each in opened_assignments if each.assignment > last_assignment][:limit]
+        allowances = own_submissions.compute_allowances(
+            session, enrolment_id, [each.assignment for each in page_assignments]
+        )
+        return [(each, allowances[each.assignment]) for each in page_assignments]
 
 
 def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
@@ -97,32 +101,32 @@ def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) 
 
 def show_given_file(service: Service, actor: Actor, course_id: int, assignment: str, file: str) -> bytes:
     """Return a file that an assignment provides to students. Raises NotFound."""
-    given = show_sheet(service, actor, course_id, assignment).given
-    if file not in given:
+    files = show_sheet(service, actor, course_id, assignment).given
+    if file not in files:
         raise _build_not_found()
-    return given[file]
+    return files[file]
 
 
 def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskView:
     """Return an assignment with the actor's attempts. Raises NotFound like ``show_sheet``."""
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
-        seen = load_visible_assignment(session, course_id, enrolment_id, assignment)
+        visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
         is_open = _is_assignment_open(session, course_id, assignment)
         attempts = own_submissions.load_own_attempts(session, enrolment_id, assignment)
         return TaskView(
-            build_task_sheet(seen),
+            build_task_sheet(visible_assignment),
             attempts.newest,
             attempts.counting,
             own_submissions.compute_allowance(session, enrolment_id, assignment),
             is_open,
-            can_test_run=is_open and build_single_trial_assignment(seen) is not None,
+            can_test_run=is_open and build_single_trial_assignment(visible_assignment) is not None,
             has_test_run=test_runs.find_newest_run(session, enrolment_id, assignment) is not None,
         )
 
 
 def list_submissions(
-    service: Service, actor: Actor, course_id: int, *, limit: int, before: int | None = None
+    service: Service, actor: Actor, course_id: int, *, limit: int, before_id: int | None = None
 ) -> list[SubmissionView]:
     """Return at most ``limit`` submissions of the actor in the course, newest first, before this id.
 
@@ -130,10 +134,10 @@ def list_submissions(
     """
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
-        found = own_submissions.load_submissions_before(session, enrolment_id, before, limit)
-        waiting = [each.job_id for each in found if each.waits]
-        places = estimate_places(session, waiting) if waiting else {}
-        return [SubmissionView(each, places.get(each.job_id)) for each in found]
+        submissions = own_submissions.load_submissions_before(session, enrolment_id, before_id, limit)
+        waiting_ids = [each.job_id for each in submissions if each.waits]
+        places = estimate_places(session, waiting_ids) if waiting_ids else {}
+        return [SubmissionView(each, places.get(each.job_id)) for each in submissions]
 
 
 def show_submission(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmissionView:
@@ -150,38 +154,44 @@ def show_submission_report(
     """Return a submission of the actor with the data of its page. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
-        found = own_submissions.find_submission_with_attempts(session, enrolment_id, submission_id)
-        if found is None:
+        submission_with_attempts = own_submissions.find_submission_with_attempts(session, enrolment_id, submission_id)
+        if submission_with_attempts is None:
             raise _build_not_found()
-        own, attempts = found
-        assignment, place = own.assignment, _add_queue_place(session, own).place
+        submission, attempts = submission_with_attempts
+        assignment, place = submission.assignment, _add_queue_place(session, submission).place
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
         is_open = _is_assignment_open(session, course_id, assignment)
-        asked = appeals.load_appeals(session, submission_id)
-        shown = _load_student_view(session, own, language) if own.shown else None
-    report = None if shown is None else render_report_body(service.store, own.job_id, own.plots, shown)
-    return ReportView(own, place, attempts.newest, attempts.counting, allowance, is_open, asked, report)
+        submission_appeals = appeals.load_appeals(session, submission_id)
+        visible_view = _load_student_view(session, submission, language) if submission.shown else None
+    report = (
+        None
+        if visible_view is None
+        else render_report_body(service.store, submission.job_id, submission.plots, visible_view)
+    )
+    return ReportView(
+        submission, place, attempts.newest, attempts.counting, allowance, is_open, submission_appeals, report
+    )
 
 
 def show_result(service: Service, actor: Actor, course_id: int, submission_id: int) -> tuple[str, View]:
     """Return the id of a grade and the part of it that the actor may see. Raises NotFound if nothing is visible."""
-    found, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
-    return found.job_id, view
+    submission, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
+    return submission.job_id, view
 
 
 def show_report(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language = ENGLISH
 ) -> str:
     """Return the visible part of the report as a standalone page. Raises NotFound like ``show_result``."""
-    found, view = _load_result(service, actor, course_id, submission_id, language)
-    return render_standalone_report(service.store, found.job_id, found.plots, view)
+    submission, view = _load_result(service, actor, course_id, submission_id, language)
+    return render_standalone_report(service.store, submission.job_id, submission.plots, view)
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, submission_id: int) -> dict[str, Any]:
     """Return the replay data of the visible trials. Raises NotFound like ``show_result``."""
-    found, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
+    submission, view = _load_result(service, actor, course_id, submission_id, ENGLISH)
     with service.store.reading() as session:
-        return build_replay_document(session, found.job_id, view)
+        return build_replay_document(session, submission.job_id, view)
 
 
 def show_files(service: Service, actor: Actor, course_id: int, submission_id: int) -> SubmittedFiles:
@@ -196,10 +206,10 @@ def load_visible_assignment(session: Session, course_id: int, enrolment_id: int,
     """Return an assignment that is open or that the student has submitted to. Raises NotFound."""
     if _is_assignment_open(session, course_id, assignment):
         return open_assignments.load_assignment(session, course_id, assignment)
-    submitted = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
-    if not submitted:
+    newest_attempt = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
+    if not newest_attempt:
         raise _build_not_found()
-    return intake.load_assignment(session, submitted[0].job_id)
+    return intake.load_assignment(session, newest_attempt[0].job_id)
 
 
 def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int:
@@ -207,33 +217,33 @@ def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int
 
 
 def _is_assignment_open(session: Session, course_id: int, assignment: str) -> bool:
-    prepared = open_assignments.list_assignments(session, course_id)
-    return any(each.assignment == assignment and each.open for each in prepared)
+    course_assignments = open_assignments.list_assignments(session, course_id)
+    return any(each.assignment == assignment and each.open for each in course_assignments)
 
 
 def _require_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission:
-    found = own_submissions.find_own_submission(session, enrolment_id, submission_id)
-    if found is None:
+    submission = own_submissions.find_own_submission(session, enrolment_id, submission_id)
+    if submission is None:
         raise _build_not_found()
-    return found
+    return submission
 
 
-def _add_queue_place(session: Session, found: OwnSubmission) -> SubmissionView:
-    return SubmissionView(found, estimate_place(session, found.job_id) if found.waits else None)
+def _add_queue_place(session: Session, submission: OwnSubmission) -> SubmissionView:
+    return SubmissionView(submission, estimate_place(session, submission.job_id) if submission.waits else None)
 
 
 def _load_result(
     service: Service, actor: Actor, course_id: int, submission_id: int, language: Language
 ) -> tuple[OwnSubmission, View]:
     with service.store.reading() as session:
-        found = _require_submission(session, _require_enrolment_id(session, actor, course_id), submission_id)
-        if not found.shown:
+        submission = _require_submission(session, _require_enrolment_id(session, actor, course_id), submission_id)
+        if not submission.shown:
             raise _build_not_found()
-        return found, _load_student_view(session, found, language)
+        return submission, _load_student_view(session, submission, language)
 
 
-def _load_student_view(session: Session, found: OwnSubmission, language: Language) -> View:
-    return build_student_view(results.load_grade(session, found.job_id), found.released, language)
+def _load_student_view(session: Session, submission: OwnSubmission, language: Language) -> View:
+    return build_student_view(results.load_grade(session, submission.job_id), submission.released, language)
 
 
 def _build_not_found() -> NotFound:

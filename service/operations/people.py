@@ -87,13 +87,13 @@ def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool
     check_operator(actor)
     with service.store.transaction() as session:
         row = _require_enrolment(session, enrolment_id)
-        ended = credentials.revoke_all(session, row.person_id)
+        ended_count = credentials.revoke_all(session, row.person_id)
         if release:
             session.get_one(Person, row.person_id).signed_in_at = None
         audit.record_action(
-            session, actor.name, "sign out", "person", str(row.person_id), ended=ended, released=release
+            session, actor.name, "sign out", "person", str(row.person_id), ended=ended_count, released=release
         )
-    return ended
+    return ended_count
 
 
 def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
@@ -109,22 +109,23 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
         if person_id == other_person:
             raise Conflict("these two accounts already belong to one person")
         lock_persons(session, person_id, other_person)
-        ours, theirs = (
+        own_courses, other_courses = (
             {each.enrolment_id: name for name, each in membership.load_enrolments(session, which)}
             for which in (person_id, other_person)
         )
-        if shared := sorted(set(ours.values()) & set(theirs.values())):
+        if shared_courses := sorted(set(own_courses.values()) & set(other_courses.values())):
             raise Conflict(
-                "both accounts are in the course %(course)s, so they cannot belong to one person", course=shared[0]
+                "both accounts are in the course %(course)s, so they cannot belong to one person",
+                course=shared_courses[0],
             )
-        vouched = any(membership.is_from_platform(session, each) for each in (person_id, other_person))
-        if vouched and not request.from_platform:
+        has_platform_member = any(membership.is_from_platform(session, each) for each in (person_id, other_person))
+        if has_platform_member and not request.from_platform:
             raise Invalid(
                 "one of the accounts signs in through a learning platform; "
                 "confirm that the platform may sign in the joined person"
             )
         membership.merge_persons(session, person_id, other_person)
-        detail = {"joined": other_person, "enrolments": sorted(theirs)}
+        detail = {"joined": other_person, "enrolments": sorted(other_courses)}
         audit.record_action(session, actor.name, "join", "person", str(person_id), **detail)
         return membership.load_enrolled_member(session, row)
 
@@ -148,19 +149,19 @@ def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) 
     check_lengths([student])
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        known = membership.find_member(session, course_id, student)
-        if known is not None:
-            raise _build_enrolled_error(known)
+        existing_member = membership.find_member(session, course_id, student)
+        if existing_member is not None:
+            raise _build_enrolled_error(existing_member)
         return _enrol_students(session, actor, course_id, [student])[0]
 
 
 def check_lengths(students: Sequence[Student]) -> None:
     """Raise Invalid if an id, a name or an e-mail address is too long."""
-    for each in students:
-        if max(map(len, (each.id, each.name, each.email))) > _LONGEST_TEXT:
+    for student in students:
+        if max(map(len, (student.id, student.name, student.email))) > _LONGEST_TEXT:
             raise Invalid(
                 "%(id)s: the ID, name or address is too long, expected at most %(most)s characters",
-                id=each.id[:_LONGEST_TEXT],
+                id=student.id[:_LONGEST_TEXT],
                 most=_LONGEST_TEXT,
             )
 
@@ -176,14 +177,14 @@ def remove(service: Service, actor: Actor, course_id: int, enrolment_id: int) ->
         lock_course(session, course_id)
         row = _require_enrolment(session, enrolment_id)
         is_ours = row.course_id == course_id
-        may = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
-        if not is_ours or not (actor.operator or may):
+        is_permitted = actor.roles.get(course_id) is Role.INSTRUCTOR and row.role is Role.STUDENT
+        if not is_ours or not (actor.operator or is_permitted):
             raise NotFound("this person is not a member of the course")
         check_no_names_hidden(session, actor, course_id)
-        removed = row.student
+        student_id = row.student
         membership.set_role(session, row, Role.STUDENT)
         remove_student(session, row.id, actor.name)
-    return removed
+    return student_id
 
 
 def issue_token(service: Service, actor: Actor, enrolment_id: int, request: TokenForRequest) -> str:
@@ -205,27 +206,27 @@ def issue_token(service: Service, actor: Actor, enrolment_id: int, request: Toke
         return secret
 
 
-def _enrol_students(session: Session, actor: Actor, course_id: int, listed: Sequence[Student]) -> list[int]:
+def _enrol_students(session: Session, actor: Actor, course_id: int, new_students: Sequence[Student]) -> list[int]:
     lock_course(session, course_id)
-    at, students = now(session), Students(session, course_id)
-    enrolled = [students.enrol(each, at) for each in listed]
-    audit.record_action(session, actor.name, "enrol", "course", str(course_id), students=len(listed))
-    return enrolled
+    current_time, students = now(session), Students(session, course_id)
+    enrolment_ids = [students.enrol(each, current_time) for each in new_students]
+    audit.record_action(session, actor.name, "enrol", "course", str(course_id), students=len(new_students))
+    return enrolment_ids
 
 
-def _build_enrolled_error(known: Member) -> Conflict:
-    has_name = known.name and known.name != known.id
-    called = Sentence(", as %(name)s", {"name": known.name}) if has_name else ""
-    if known.role is Role.INSTRUCTOR:
+def _build_enrolled_error(member: Member) -> Conflict:
+    has_name = member.name and member.name != member.id
+    name_note = Sentence(", as %(name)s", {"name": member.name}) if has_name else ""
+    if member.role is Role.INSTRUCTOR:
         return Conflict(
             "%(id)s is an instructor of this course%(called)s; expected the ID of a student.",
-            id=known.id,
-            called=called,
+            id=member.id,
+            called=name_note,
         )
     return Conflict(
         "%(id)s is already enrolled in this course%(called)s; to change the name or address, upload a table.",
-        id=known.id,
-        called=called,
+        id=member.id,
+        called=name_note,
     )
 
 

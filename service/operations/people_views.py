@@ -64,19 +64,19 @@ def search_members(service: Service, actor: Actor, course_id: int, text: str = "
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         members = membership.list_members(session, course_id)
-        extended = frozenset(each.enrolment_id for each in policies.list_extensions(session, course_id))
+        extended_ids = frozenset(each.enrolment_id for each in policies.list_extensions(session, course_id))
         platform = lti.find_course_link(session, course_id)
-    wanted = text.strip().casefold()
-    found = [each for each in members if wanted in f"{each.id} {each.name} {each.email}".casefold()]
-    pages = max(1, -(-len(found) // _PAGE_SIZE))
+    search_text = text.strip().casefold()
+    matching_members = [each for each in members if search_text in f"{each.id} {each.name} {each.email}".casefold()]
+    pages = max(1, -(-len(matching_members) // _PAGE_SIZE))
     number = min(number, pages)
     return MemberPage(
-        tuple(found[(number - 1) * _PAGE_SIZE : number * _PAGE_SIZE]),
-        len(found),
+        tuple(matching_members[(number - 1) * _PAGE_SIZE : number * _PAGE_SIZE]),
+        len(matching_members),
         number,
         pages,
         sum(each.role is Role.STUDENT for each in members),
-        extended,
+        extended_ids,
         platform,
     )
 
@@ -85,14 +85,14 @@ def show_student(service: Service, actor: Actor, course_id: int, enrolment_id: i
     """Return one student of a course. Raises NotFound."""
     with service.store.reading() as session:
         row = require_student(session, actor, course_id, enrolment_id)
-        hidden = open_assignments.load_anonymous_assignments(session, course_id)
+        anonymous_assignments = open_assignments.load_anonymous_assignments(session, course_id)
         gradings = own_gradings.list_newest_gradings(session, enrolment_id)
         extensions = policies.list_extensions(session, course_id)
         return StudentView(
             membership.load_enrolled_member(session, row),
-            tuple(each for each in gradings if each.assignment not in hidden),
-            bool(hidden),
+            tuple(each for each in gradings if each.assignment not in anonymous_assignments),
+            bool(anonymous_assignments),
             tuple(each for each in extensions if each.enrolment_id == row.id),
-            has_submitted(session, row.id, hidden),
+            has_submitted(session, row.id, anonymous_assignments),
             tuple(open_assignments.list_assignments(session, course_id)),
         )

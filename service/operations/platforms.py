@@ -79,18 +79,18 @@ def enrol_members(service: Service, actor: Actor, course_id: int) -> EnrolledMem
 
     with service.store.reading() as session:
         link = _require_platform_link(session, actor, course_id)
-    found = services.fetch_members(service.store, link)
-    refused = []
+    platform_members = services.fetch_members(service.store, link)
+    refusals = []
     with service.store.transaction() as session:
-        for each in found:
+        for member in platform_members:
             try:
                 with session.begin_nested():
-                    lti.enrol_subject(session, link.platform, course_id, each.subject, each.student, each.role)
+                    lti.enrol_subject(session, link.platform, course_id, member.subject, member.student, member.role)
             except UsageError as error:
-                refused.append(str(error))
-        enrolled = EnrolledMembers(len(found) - len(refused), tuple(refused))
-        audit.record_action(session, actor.name, "enrol", "course", str(course_id), members=enrolled.members)
-    return enrolled
+                refusals.append(str(error))
+        enrolled_members = EnrolledMembers(len(platform_members) - len(refusals), tuple(refusals))
+        audit.record_action(session, actor.name, "enrol", "course", str(course_id), members=enrolled_members.members)
+    return enrolled_members
 
 
 def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -> int:
@@ -110,12 +110,12 @@ def pass_back(service: Service, actor: Actor, course_id: int, assignment: str) -
             "a learning platform shows marks with names, but names are hidden for %(assignment)s; show the names first",
             assignment=assignment,
         )
-    sent = send_marks(service.store, link, course_id, assignment)
+    sent_count = send_marks(service.store, link, course_id, assignment)
     with service.store.transaction() as session:
         audit.record_action(
-            session, actor.name, "pass_back", "course", str(course_id), assignment=assignment, sent=sent
+            session, actor.name, "pass_back", "course", str(course_id), assignment=assignment, sent=sent_count
         )
-    return sent
+    return sent_count
 
 
 def _require_platform_link(session: Session, actor: Actor, course_id: int) -> CourseLink:

@@ -62,8 +62,10 @@ def export_student(service: Service, actor: Actor, course_id: int, enrolment_id:
 
     with service.store.reading() as session:
         require_student(session, actor, course_id, enrolment_id)
-        hidden = frozenset() if actor.is_machine else open_assignments.load_anonymous_assignments(session, course_id)
-    return StudentData(enrolment_id, exported(service.store, enrolment_id, hidden))
+        anonymous_assignments = (
+            frozenset() if actor.is_machine else open_assignments.load_anonymous_assignments(session, course_id)
+        )
+    return StudentData(enrolment_id, exported(service.store, enrolment_id, anonymous_assignments))
 
 
 @retry_conflicts
@@ -106,7 +108,7 @@ def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest)
         raise Invalid("the age must be from 1 to %(most)s days", most=_MOST_DAYS)
     with service.store.reading() as session:
         require_course(session, actor, course_id)
-        before = now(session) - timedelta(days=request.older_than_days)
+        cutoff = now(session) - timedelta(days=request.older_than_days)
     return purging.purge_submissions(
-        service.store, before, actor.name, course_id=course_id, only_count=request.only_count
+        service.store, cutoff, actor.name, course_id=course_id, only_count=request.only_count
     )

@@ -47,10 +47,10 @@ def regrade_batch(
         NotFound: The course does not have the batch, or the actor does not instruct it.
         UsageError: There is nothing to grade again, or the assignment does not exist.
     """
-    frozen = _freeze_assignment(service, actor, course_id, assignment)
-    made = _regrade_batch(service, actor, course_id, batch_id, frozen)
-    service.notifier.grade(JobQueue.BATCH, made.jobs)
-    return made
+    frozen_assignment = _freeze_assignment(service, actor, course_id, assignment)
+    regrade = _regrade_batch(service, actor, course_id, batch_id, frozen_assignment)
+    service.notifier.grade(JobQueue.BATCH, regrade.jobs)
+    return regrade
 
 
 def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, assignment: Assignment | str = "") -> str:
@@ -58,49 +58,53 @@ def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, ass
 
     ``assignment`` and errors as in ``regrade_batch``.
     """
-    frozen = _freeze_assignment(service, actor, course_id, assignment)
-    made = _regrade_one(service, actor, course_id, job_id, frozen)
+    frozen_assignment = _freeze_assignment(service, actor, course_id, assignment)
+    new_job_id = _regrade_one(service, actor, course_id, job_id, frozen_assignment)
     service.notifier.grade(JobQueue.INTERACTIVE)
-    return made
+    return new_job_id
 
 
 def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) -> list[Change]:
     """Return the changes of a batch of regrades, by student; empty for any other batch. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return regrades.load_changes(session, batch_id, hidden)
+        return regrades.load_changes(session, batch_id, hidden_names)
 
 
 @retry_conflicts
 def publish(
-    service: Service, actor: Actor, course_id: int, batch_id: str, *, anyway: bool = False
+    service: Service, actor: Actor, course_id: int, batch_id: str, *, includes_unjudged: bool = False
 ) -> PublicationCounts:
     """Publish the newest grades of a batch, which become the standing grades.
 
-    ``anyway`` includes grades with unjudged criteria. Raises NotFound.
+    ``includes_unjudged`` includes grades with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        done = publishing.publish_batch(session, batch_id, actor=actor.name, anyway=anyway)
-        return _record_publication(session, actor, course_id, "batch", batch_id, done)
+        publication_counts = publishing.publish_batch(
+            session, batch_id, actor=actor.name, includes_unjudged=includes_unjudged
+        )
+        return _record_publication(session, actor, course_id, "batch", batch_id, publication_counts)
 
 
 @retry_conflicts
 def publish_one(
-    service: Service, actor: Actor, course_id: int, job_id: str, *, anyway: bool = False
+    service: Service, actor: Actor, course_id: int, job_id: str, *, includes_unjudged: bool = False
 ) -> PublicationCounts:
     """Publish the newest grade of one submission, which becomes its standing grade.
 
-    ``anyway`` permits a grade with unjudged criteria. Raises NotFound.
+    ``includes_unjudged`` permits a grade with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_job(session, course_id, job_id)
-        done = publishing.publish_grade(session, job_id, actor=actor.name, anyway=anyway)
-        return _record_publication(session, actor, course_id, "job", job_id, done)
+        publication_counts = publishing.publish_grade(
+            session, job_id, actor=actor.name, includes_unjudged=includes_unjudged
+        )
+        return _record_publication(session, actor, course_id, "job", job_id, publication_counts)
 
 
 def preview_publication(service: Service, actor: Actor, course_id: int, batch_id: str) -> PublicationPreview:
@@ -129,22 +133,30 @@ def grade_over_limit(service: Service, actor: Actor, course_id: int, job_id: str
 
 @retry_conflicts
 def _regrade_batch(
-    service: Service, actor: Actor, course_id: int, batch_id: str, frozen: FrozenAssignment | None
+    service: Service, actor: Actor, course_id: int, batch_id: str, frozen_assignment: FrozenAssignment | None
 ) -> RegradeBatch:
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         original = require_batch(session, course_id, batch_id)
-        made = regrades.queue_regrades(session, original, frozen, max_attempts=service.settings.max_attempts)
-        audit.record_action(session, actor.name, "regrade", "batch", batch_id, as_batch=made.batch_id, grades=made.jobs)
-        return made
+        regrade = regrades.queue_regrades(
+            session, original, frozen_assignment, max_attempts=service.settings.max_attempts
+        )
+        audit.record_action(
+            session, actor.name, "regrade", "batch", batch_id, as_batch=regrade.batch_id, grades=regrade.jobs
+        )
+        return regrade
 
 
 @retry_conflicts
-def _regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, frozen: FrozenAssignment | None) -> str:
+def _regrade_one(
+    service: Service, actor: Actor, course_id: int, job_id: str, frozen_assignment: FrozenAssignment | None
+) -> str:
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        asked = require_job(session, course_id, job_id)
-        proposal = regrades.queue_regrade(session, asked, frozen, max_attempts=service.settings.max_attempts)
+        requested_job = require_job(session, course_id, job_id)
+        proposal = regrades.queue_regrade(
+            session, requested_job, frozen_assignment, max_attempts=service.settings.max_attempts
+        )
         audit.record_action(session, actor.name, "regrade", "job", proposal.regrade_of or job_id, as_job=proposal.id)
         return proposal.id
 
@@ -168,12 +180,14 @@ def _record_publication(
     course_id: int,
     subject: Literal["batch", "job"],
     subject_id: str,
-    done: PublicationCounts,
+    publication_counts: PublicationCounts,
 ) -> PublicationCounts:
     """Record a publication in the activity log, and notify the course's webhooks if a grade was released."""
-    counts = {name: count for name, count in asdict(done).items() if count or name in ("published", "replaced")}
+    counts = {
+        name: count for name, count in asdict(publication_counts).items() if count or name in ("published", "replaced")
+    }
     audit.record_action(session, actor.name, "publish", subject, subject_id, **counts)
-    if done.published:
-        named = {"batch" if subject == "batch" else "grade": subject_id}
-        outbox.emit_grades_published(session, course_id, **named, published=done.published)
-    return done
+    if publication_counts.published:
+        subject_key = {"batch" if subject == "batch" else "grade": subject_id}
+        outbox.emit_grades_published(session, course_id, **subject_key, published=publication_counts.published)
+    return publication_counts

@@ -38,22 +38,22 @@ class InProgress(Exception):
 @retry_conflicts
 def reserve_key(service: Service, actor: Actor, key: str) -> StoredReply | None:
     """Return the reply for this key; None if the key is new, which reserves it. Raises InProgress."""
-    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
+    is_own = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:
-        at = now(session)
-        session.execute(delete(IdempotentReply).where(IdempotentReply.made_at < at - RETENTION))
-        abandoned = (IdempotentReply.status == _UNFINISHED, IdempotentReply.made_at < at - _ABANDONED)
-        session.execute(delete(IdempotentReply).where(*mine, *abandoned))
-        held = {
+        current_time = now(session)
+        session.execute(delete(IdempotentReply).where(IdempotentReply.made_at < current_time - RETENTION))
+        is_abandoned = (IdempotentReply.status == _UNFINISHED, IdempotentReply.made_at < current_time - _ABANDONED)
+        session.execute(delete(IdempotentReply).where(*is_own, *is_abandoned))
+        reservation = {
             "credential_id": actor.credential_id,
             "key": key,
             "request_sha256": "",
             "status": _UNFINISHED,
             "body": b"",
         }
-        if insert_if_new(session, IdempotentReply, **held, made_at=at):
+        if insert_if_new(session, IdempotentReply, **reservation, made_at=current_time):
             return None
-        row = session.scalars(select(IdempotentReply).where(*mine)).one()
+        row = session.scalars(select(IdempotentReply).where(*is_own)).one()
         if row.status == _UNFINISHED:
             raise InProgress
         return StoredReply(row.request_sha256, row.status, row.body)
@@ -62,15 +62,15 @@ def reserve_key(service: Service, actor: Actor, key: str) -> StoredReply | None:
 @retry_conflicts
 def store_reply(service: Service, actor: Actor, key: str, reply: StoredReply) -> None:
     """Store the reply for this key."""
-    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
+    is_own = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     values = {"request_sha256": reply.request_sha256, "status": reply.status, "body": reply.body}
     with service.store.transaction() as session:
-        session.execute(update(IdempotentReply).where(*mine).values(**values))
+        session.execute(update(IdempotentReply).where(*is_own).values(**values))
 
 
 @retry_conflicts
 def release_key(service: Service, actor: Actor, key: str) -> None:
     """Release the key of a failed request."""
-    mine = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
+    is_own = (IdempotentReply.credential_id == actor.credential_id, IdempotentReply.key == key)
     with service.store.transaction() as session:
-        session.execute(delete(IdempotentReply).where(*mine))
+        session.execute(delete(IdempotentReply).where(*is_own))

@@ -39,10 +39,10 @@ def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | 
     Returns None if the secret is not valid, or the token does not permit browser sign-in.
     """
     with service.store.transaction() as session:
-        started = credentials.redeem_link(session, secret) or credentials.start_session(session, secret)
-        if started is not None and actor is not None:
+        new_session = credentials.redeem_link(session, secret) or credentials.start_session(session, secret)
+        if new_session is not None and actor is not None:
             _end_session(session, actor)
-    return started
+    return new_session
 
 
 def sign_out(service: Service, actor: Actor) -> None:

@@ -67,14 +67,18 @@ def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS)
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         check_no_names_hidden(session, actor, course_id)
-        listed = membership.list_students(session, course_id)
-        person_ids = [each.person_id for each, more in listed if not more]
-        made = credentials.replace_links(session, person_ids, lifetime, reach=_build_reach(course_id))
-        until = now(session) + lifetime
-        audit.record_action(session, actor.name, "links", "course", str(course_id), students=len(made), days=days)
+        student_list = membership.list_students(session, course_id)
+        person_ids = [each.person_id for each, more in student_list if not more]
+        secrets_by_person = credentials.replace_links(session, person_ids, lifetime, reach=_build_reach(course_id))
+        expires_at = now(session) + lifetime
+        audit.record_action(
+            session, actor.name, "links", "course", str(course_id), students=len(secrets_by_person), days=days
+        )
     return [
-        StudentLink(each, None, None, _ELSEWHERE) if more else StudentLink(each, made[each.person_id], until, "")
-        for each, more in listed
+        StudentLink(each, None, None, _ELSEWHERE)
+        if more
+        else StudentLink(each, secrets_by_person[each.person_id], expires_at, "")
+        for each, more in student_list
     ]
 
 
@@ -111,11 +115,11 @@ def make_own_link(service: Service, actor: Actor) -> str:
         return make_link(session, actor, member.person_id)
 
 
-def make_members_link(service: Service, actor: Actor, course: str, who: str) -> tuple[Member, str]:
+def make_members_link(service: Service, actor: Actor, course: str, member_id: str) -> tuple[Member, str]:
     """Return a member of a course by course name and id, with the secret of a new link. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.transaction() as session:
-        member = membership.load_member(session, course, who)
+        member = membership.load_member(session, course, member_id)
         return member, make_link(session, actor, member.person_id)
 
 

@@ -31,15 +31,15 @@ class ComparedBatch:
 
 def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> ComparedBatch:
     """Compare the newest submissions of the whole course for the assignments of a batch. Raises NotFound."""
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
         line = batches.load_batch(session, batch_id)
         assignments = sorted({each.assignment for each in batches.load_job_lines(session, batch_id)})
-        lines = tuple(batches.load_course_lines(session, course_id, assignments, hidden))
-    found = tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
-    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).load_text)
+        lines = tuple(batches.load_course_lines(session, course_id, assignments, hidden_names))
+    similarities = tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
+    return ComparedBatch(line, lines, similarities, SourceTexts(service.store, lines).load_text)
 
 
 def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) -> tuple[Similarity, ...]:
@@ -47,32 +47,32 @@ def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
     Raises NotFound, and Invalid if there are too many to compare.
     """
-    shown = show_similar(service, actor, course_id, batch_id)
-    if shown.found is None:
+    compared_batch = show_similar(service, actor, course_id, batch_id)
+    if compared_batch.found is None:
         raise Invalid(
             "%(count)s submissions are too many for an immediate comparison, expected at most %(most)s; "
             "to compare the submissions of this batch, run robomark batch similar %(batch)s",
-            count=len(shown.lines),
+            count=len(compared_batch.lines),
             most=MOST_AT_ONCE,
             batch=batch_id,
         )
-    return shown.found
+    return compared_batch.found
 
 
 def show_similar_in_batch(
-    service: Service, actor: Actor, course_id: int, batch_id: str, given: Path | None = None
+    service: Service, actor: Actor, course_id: int, batch_id: str, given_code: Path | None = None
 ) -> ComparedBatch:
-    """Compare the submissions of one batch only, in any number, without the code in ``given``.
+    """Compare the submissions of one batch only, in any number, without the code in ``given_code``.
 
     Raises:
         NotFound: The course does not have the batch, or the actor does not instruct it.
-        UsageError: ``given`` cannot be read.
+        UsageError: ``given_code`` cannot be read.
     """
-    hidden = load_names_for_actor(service, actor, course_id)
+    hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
         line = batches.load_batch(session, batch_id)
-        lines = tuple(batches.load_job_lines(session, batch_id, hidden))
-    found = tuple(find_similar_submissions(service.store, lines, given))
-    return ComparedBatch(line, lines, found, SourceTexts(service.store, lines).load_text)
+        lines = tuple(batches.load_job_lines(session, batch_id, hidden_names))
+    similarities = tuple(find_similar_submissions(service.store, lines, given_code))
+    return ComparedBatch(line, lines, similarities, SourceTexts(service.store, lines).load_text)

@@ -76,5 +76,8 @@ def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
     own_secret = load_secret(service.store)
     with service.store.reading() as session:
         job = session.get_one(Job, batches.find_job(session, grade))
-        stored, request = results.load_original_grade(session, job.id), intake.load_grading_request(session, job.id)
-        return StoredGrading(job.id, stored, request, job.grader_sha256, job.secret_sha256, own_secret)
+        stored_grade, request = (
+            results.load_original_grade(session, job.id),
+            intake.load_grading_request(session, job.id),
+        )
+        return StoredGrading(job.id, stored_grade, request, job.grader_sha256, job.secret_sha256, own_secret)

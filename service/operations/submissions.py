@@ -51,16 +51,18 @@ class SubmissionTarget:
     opened: CourseAssignment
     assignment: Assignment
 
-    def read(self, sent: Sequence[UploadedFile]) -> GradingRequest:
+    def read(self, files: Sequence[UploadedFile]) -> GradingRequest:
         """Read the submission in these files. Raises UsageError if they are not a valid one."""
-        if not sent:
+        if not files:
             raise UsageError("no files were submitted; select a file, or paste a program.")
-        source = sanitise_name(", ".join(dict.fromkeys(each.flat_name for each in sent)))
-        asked = self.assignment
-        submission = build_submission(read_uploaded(sent, source), source, self.student.id, asked.id, asked.parts)
+        source = sanitise_name(", ".join(dict.fromkeys(each.flat_name for each in files)))
+        assignment = self.assignment
+        submission = build_submission(
+            read_uploaded(files, source), source, self.student.id, assignment.id, assignment.parts
+        )
         for name in find_empty_parts(submission):
             raise UsageError("%(name)s is empty, expected a program.", name=name)
-        return GradingRequest(submission, asked, source, listed_student=self.student)
+        return GradingRequest(submission, assignment, source, listed_student=self.student)
 
 
 def load_submission_target(service: Service, actor: Actor, course_id: int, assignment: str) -> SubmissionTarget:
@@ -70,15 +72,15 @@ def load_submission_target(service: Service, actor: Actor, course_id: int, assig
     """
     with service.store.reading() as session:
         enrolment = require_own_enrolment(session, actor, course_id, Role.STUDENT)
-        opened = {each.assignment: each for each in open_assignments.list_assignments(session, course_id)}.get(
+        open_assignment = {each.assignment: each for each in open_assignments.list_assignments(session, course_id)}.get(
             assignment
         )
-        if opened is None or opened.opened_at is None:
+        if open_assignment is None or open_assignment.opened_at is None:
             raise NotFound("There is no such page or item, or you have no access to it.")
-        open_assignments.check_open(opened)
-        found = open_assignments.load_assignment(session, course_id, assignment)
+        open_assignments.check_open(open_assignment)
+        assignment_version = open_assignments.load_assignment(session, course_id, assignment)
         course = session.get_one(Course, course_id).name
-        return SubmissionTarget(course, enrolment.id, Student(enrolment.written), opened, found)
+        return SubmissionTarget(course, enrolment.id, Student(enrolment.written), open_assignment, assignment_version)
 
 
 def submit(service: Service, actor: Actor, course_id: int, request: SubmissionRequest) -> AcceptedSubmission:
@@ -89,23 +91,23 @@ def submit(service: Service, actor: Actor, course_id: int, request: SubmissionRe
         LacksPart: One of two parts is missing.
         UsageError: The assignment is closed, or the files are not a valid submission.
     """
-    way = load_submission_target(service, actor, course_id, request.assignment)
-    asked = way.read(request.sent)
-    lacking = find_missing_part(asked.submission, way.assignment.parts)
-    if lacking is not None and not request.even_in_part:
+    target = load_submission_target(service, actor, course_id, request.assignment)
+    grading_request = target.read(request.sent)
+    missing_part = find_missing_part(grading_request.submission, target.assignment.parts)
+    if missing_part is not None and not request.even_in_part:
         raise MissingPart(
             "there is no %(name)s; add it, or confirm below that you want to submit without it, which uses an attempt.",
-            name=PART_FILES[lacking],
+            name=PART_FILES[missing_part],
         )
-    accepted = intake.accept_submission(
+    accepted_submission = intake.accept_submission(
         service.store,
-        asked,
-        course=way.course,
+        grading_request,
+        course=target.course,
         max_attempts=service.settings.max_attempts,
-        batch_id=way.opened.batch_id,
-        most_bytes=service.settings.student_quota_mb * MEGABYTE,
-        enrolment_id=way.enrolment_id,
+        batch_id=target.opened.batch_id,
+        max_bytes=service.settings.student_quota_mb * MEGABYTE,
+        enrolment_id=target.enrolment_id,
     )
-    if accepted.copied_from is None and not accepted.staff_only:
+    if accepted_submission.copied_from is None and not accepted_submission.staff_only:
         service.notifier.grade(JobQueue.INTERACTIVE)
-    return accepted
+    return accepted_submission

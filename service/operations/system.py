@@ -64,8 +64,8 @@ def list_workers(service: Service, actor: Actor) -> list[tuple[WorkerLine, Quara
     """Return the known workers by name, each with its quarantine if it is in one. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        quarantined = {each.worker: each for each in workers.list_quarantined_workers(session)}
-        return [(seen, quarantined.get(seen.worker.name)) for seen in workers.load_workers(session)]
+        quarantines_by_name = {each.worker: each for each in workers.list_quarantined_workers(session)}
+        return [(seen, quarantines_by_name.get(seen.worker.name)) for seen in workers.load_workers(session)]
 
 
 def list_failed(service: Service, actor: Actor) -> list[DeadLetter]:

@@ -36,41 +36,49 @@ class TestRunView:
     submission: Submission | None
 
 
-def start(service: Service, actor: Actor, course_id: int, assignment: str, sent: Sequence[UploadedFile]) -> str:
+def start(service: Service, actor: Actor, course_id: int, assignment: str, files: Sequence[UploadedFile]) -> str:
     """Queue a test run and notify the workers. Returns the id of the test run.
 
     Raises NotFound if students cannot see the assignment. Raises UsageError if it is closed or has no visible scenario,
     the files are not a valid submission, or the student has too many test runs.
     """
-    way = load_submission_target(service, actor, course_id, assignment)
-    if build_single_trial_assignment(way.assignment) is None:
+    target = load_submission_target(service, actor, course_id, assignment)
+    if build_single_trial_assignment(target.assignment) is None:
         raise UsageError("test runs are not available for this assignment; submit your files instead.")
-    packed = pack_submission(way.read(sent).submission)
+    packed_submission = pack_submission(target.read(files).submission)
     with service.store.transaction() as session:
-        made = test_runs.queue_test_run(session, way.enrolment_id, way.opened.version_id, packed)
+        test_run_id = test_runs.queue_test_run(
+            session, target.enrolment_id, target.opened.version_id, packed_submission
+        )
     service.notifier.notify_test_runs()
-    return made
+    return test_run_id
 
 
 def show_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> TestRunView:
     """Return the actor's newest test run of an assignment, with its program. Raises NotFound if they may not see it."""
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-        seen = load_visible_assignment(session, course_id, enrolment_id, assignment)
-        newest = test_runs.find_newest_run(session, enrolment_id, assignment)
-        line = test_runs.find_student_run(session, enrolment_id, newest) if newest else None
-        replay = test_runs.load_replay(session, newest) if newest else None
-        submission = unpack_submission(test_runs.load_program(session, newest)[0]) if newest else None
-    once = build_single_trial_assignment(seen)
-    return TestRunView(build_task_sheet(seen), once.scenarios[0].seconds if once else None, line, replay, submission)
+        visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
+        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
+        line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
+        replay = test_runs.load_replay(session, newest_id) if newest_id else None
+        submission = unpack_submission(test_runs.load_program(session, newest_id)[0]) if newest_id else None
+    trial_assignment = build_single_trial_assignment(visible_assignment)
+    return TestRunView(
+        build_task_sheet(visible_assignment),
+        trial_assignment.scenarios[0].seconds if trial_assignment else None,
+        line,
+        replay,
+        submission,
+    )
 
 
 def find_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> StudentTestRun | None:
     """Return the state of the actor's newest test run of an assignment; None if there is none."""
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-        newest = test_runs.find_newest_run(session, enrolment_id, assignment)
-        return test_runs.find_student_run(session, enrolment_id, newest) if newest else None
+        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
+        return test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
 
 
 def show(service: Service, actor: Actor, course_id: int, tryout_id: str) -> StudentTestRun:

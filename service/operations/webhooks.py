@@ -47,9 +47,9 @@ def revoke(service: Service, actor: Actor, course_id: int, webhook_id: str) -> N
 
 
 def list_deliveries(
-    service: Service, actor: Actor, course_id: int, limit: int, after: tuple[datetime, str] | None = None
+    service: Service, actor: Actor, course_id: int, limit: int, cursor: tuple[datetime, str] | None = None
 ) -> list[DeliveryLine]:
     """Return deliveries of a course, newest first, after the one with this time and id. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
-        return webhooks.list_deliveries(session, course_id, limit, after)
+        return webhooks.list_deliveries(session, course_id, limit, cursor)

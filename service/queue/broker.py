@@ -45,8 +45,8 @@ def prepare_socket_path(settings: Settings) -> Path:
     name = hashlib.sha256(os.fsencode(settings.home)).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"robomark-{os.getuid()}-{name}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid() or status.st_mode & 0o077:
         raise HostError(f"{folder} is not a private folder of yours; remove it and try again")
     return folder / "valkey.sock"
 
@@ -63,11 +63,11 @@ def is_broker_responding(settings: Settings) -> bool:
 
 def create_broker_client(url: str, seconds: float) -> redis.Redis:
     """Return a client for a server address in Celery's format, with this time-out and without retries."""
-    never_again = Retry(NoBackoff(), 0)
+    no_retry = Retry(NoBackoff(), 0)
     if url.startswith("redis+socket://"):
         path = url.removeprefix("redis+socket://").partition("?")[0]
-        return redis.Redis(unix_socket_path=path, socket_timeout=seconds, retry=never_again)
-    return redis.Redis.from_url(url, socket_timeout=seconds, socket_connect_timeout=seconds, retry=never_again)
+        return redis.Redis(unix_socket_path=path, socket_timeout=seconds, retry=no_retry)
+    return redis.Redis.from_url(url, socket_timeout=seconds, socket_connect_timeout=seconds, retry=no_retry)
 
 
 def fetch_broker_version(url: str, seconds: float) -> str | None:
@@ -133,13 +133,13 @@ class EmbeddedBroker:
     def _start_under_lock(self) -> None:
         open_home(self._settings.home)
         path = prepare_run_file(self._settings.home / "run" / "broker.lock")
-        until = time.monotonic() + _START_SECONDS
+        deadline = time.monotonic() + _START_SECONDS
         try:
             with path.open("a") as lock:
                 while not _try_lock(lock):
                     if is_broker_responding(self._settings):
                         return
-                    if time.monotonic() > until:
+                    if time.monotonic() > deadline:
                         raise HostError(
                             f"the broker of {self._settings.home} is running but does not respond; stop it first"
                         )
@@ -155,9 +155,9 @@ class EmbeddedBroker:
         if self._try_start(data, log, lock):
             return
         # Its data may be unreadable. It contains only notifications, which the sweeper repeats.
-        aside = data.with_name("broker.unreadable")
-        shutil.rmtree(aside, ignore_errors=True)
-        data.replace(aside)
+        backup = data.with_name("broker.unreadable")
+        shutil.rmtree(backup, ignore_errors=True)
+        data.replace(backup)
         if not self._try_start(data, log, lock):
             raise HostError(f"the bundled broker does not start; see {log}")
 
@@ -187,9 +187,9 @@ class EmbeddedBroker:
         arguments = [part for name, value in options.items() for part in (f"--{name}", value)]
         # The server inherits the lock, so the lock is held exactly as long as the server runs.
         self._process = start_process([str(binary), *arguments], {}, log, signal.SIGTERM, [lock])
-        until = time.monotonic() + _START_SECONDS
+        deadline = time.monotonic() + _START_SECONDS
         while not is_broker_responding(self._settings):
-            if self._process.poll() is not None or time.monotonic() > until:
+            if self._process.poll() is not None or time.monotonic() > deadline:
                 self._stop_process(grace_seconds=1)
                 return False
             time.sleep(0.02)

@@ -35,7 +35,7 @@ def make_celery(settings: Settings) -> Celery:
     """Create a Celery app for this broker. ``settings.broker_url`` must be set."""
     app = Celery("robomark", broker=settings.broker_url, include=["service.queue.tasks"], set_as_current=False)
     exchange = Exchange("robomark", type="direct")
-    soft, hard = (settings.job_seconds + more for more in GRACE_SECONDS)
+    soft_limit, hard_limit = (settings.job_seconds + more for more in GRACE_SECONDS)
     app.conf.update(
         task_ignore_result=True,
         task_serializer="json",
@@ -52,8 +52,8 @@ def make_celery(settings: Settings) -> Celery:
         task_retry_on_worker_lost=False,
         task_acks_on_failure=True,
         task_acks_on_timeout=True,
-        task_soft_time_limit=soft,
-        task_time_limit=hard,
+        task_soft_time_limit=soft_limit,
+        task_time_limit=hard_limit,
         task_publish_retry=True,
         task_publish_retry_policy={
             "max_retries": 2,
@@ -65,7 +65,7 @@ def make_celery(settings: Settings) -> Celery:
         broker_connection_max_retries=None,
         broker_channel_error_retry=True,
         broker_transport_options={
-            "visibility_timeout": 2 * hard,
+            "visibility_timeout": 2 * hard_limit,
             "unacked_restore_interval": 10,
             "unacked_restore_throttle": 1,
             "queue_order_strategy": "priority",

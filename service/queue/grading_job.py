@@ -78,10 +78,10 @@ def plot_next_job(store: Store, settings: Settings) -> str | None:
     if job_id is None:
         return None
     with store.reading() as session:
-        graded = results.load_original_grade(session, job_id)
-        asked = intake.load_grading_request(session, job_id)
-    drawn = draw_plots(graded, asked.assignment, asked.submission)
-    _retry_while_unreachable(lambda: plots.store_plots(store, job_id, drawn), settings.lease_seconds)
+        original_grade = results.load_original_grade(session, job_id)
+        request = intake.load_grading_request(session, job_id)
+    drawn_plots = draw_plots(original_grade, request.assignment, request.submission)
+    _retry_while_unreachable(lambda: plots.store_plots(store, job_id, drawn_plots), settings.lease_seconds)
     return job_id
 
 
@@ -92,18 +92,18 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
     progress = _Progress(claim)
     with store.reading() as session:
         grading_request = intake.load_grading_request(session, claim.job_id)
-    impatient = store.with_short_wait()
+    short_wait_store = store.with_short_wait()
     with LeaseKeeper(
-        lambda: jobs.renew_lease(impatient, claim, settings.lease_seconds, progress.share),
+        lambda: jobs.renew_lease(short_wait_store, claim, settings.lease_seconds, progress.share),
         settings.lease_seconds,
         settings.job_seconds,
     ) as keeper:
 
-        def observe(told: GradingProgress) -> None:
-            progress.update_trials(told)
+        def observe(progress_report: GradingProgress) -> None:
+            progress.update_trials(progress_report)
             keeper.check()
 
-        graded = grade(
+        new_grade = grade(
             grading_request.submission,
             grading_request.assignment,
             secret=load_secret(store),
@@ -113,23 +113,23 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
         # Marks made after the time limit may lack interrupted trials.
         keeper.check()
         graded_at = progress.estimate_database_time()
-        for result in graded.criteria:
+        for result in new_grade.criteria:
             if result.unjudged:
                 _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
-        _check_for_host_error(graded)
-        prepared = results.prepare_grade(graded)
+        _check_for_host_error(new_grade)
+        prepared_grade = results.prepare_grade(new_grade)
     # The work is done, so a short outage of the database must not lose it.
     _retry_while_unreachable(
-        lambda: jobs.finish_job(store, claim, prepared, graded_at, progress.trials_at), settings.lease_seconds
+        lambda: jobs.finish_job(store, claim, prepared_grade, graded_at, progress.trials_at), settings.lease_seconds
     )
-    _log.info("job.graded", verdict=graded.verdict.value, seconds=round(progress.seconds, 3))
+    _log.info("job.graded", verdict=new_grade.verdict.value, seconds=round(progress.seconds, 3))
 
 
-def _check_for_host_error(graded: Grade) -> None:
+def _check_for_host_error(new_grade: Grade) -> None:
     """Raise HostError if this machine, and not the student, ended a trial."""
-    broken = next((trial for trial in graded.trials if trial.verdict is Verdict.HOST_ERROR), None)
-    if broken is not None:
-        faults = collect_faults(broken.recording)
+    broken_trial = next((trial for trial in new_grade.trials if trial.verdict is Verdict.HOST_ERROR), None)
+    if broken_trial is not None:
+        faults = collect_faults(broken_trial.recording)
         raise HostError(faults[0].message if faults else "a trial ended because of a machine fault")
 
 
@@ -151,22 +151,22 @@ class _Progress:
         """Return the time by the database's clock, because this machine's clock may be wrong."""
         return self._claimed_at + timedelta(seconds=self.seconds)
 
-    def update_trials(self, told: GradingProgress) -> None:
+    def update_trials(self, progress_report: GradingProgress) -> None:
         """Update the number of finished trials."""
-        self.share = told.trials_done / max(1, told.trials)
-        if told.trials_done >= told.trials and self.trials_at is None:
+        self.share = progress_report.trials_done / max(1, progress_report.trials)
+        if progress_report.trials_done >= progress_report.trials and self.trials_at is None:
             self.trials_at = self.estimate_database_time()
 
 
 def _retry_while_unreachable(change: Callable[[], Result], seconds: float) -> Result:
     """Repeat a change while the database is unreachable, for at most ``seconds``."""
-    until = time.monotonic() + seconds
+    deadline = time.monotonic() + seconds
     pause = 0.1
     while True:
         try:
             return change()
         except DBAPIError as error:
-            if time.monotonic() + pause > until:
+            if time.monotonic() + pause > deadline:
                 raise
             _log.warning("database.retry", error=str(error))
             time.sleep(pause)

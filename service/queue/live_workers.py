@@ -47,11 +47,11 @@ def build_heartbeat_path(settings: Settings, name: str) -> Path:
 def locked_heartbeat_file(settings: Settings, name: str) -> Iterator[None]:
     """Create the worker's file in the run folder, locked until this process ends for any reason."""
     path = prepare_run_file(build_heartbeat_path(settings, name))
-    hidden = prepare_run_file(path.with_suffix(".new"))
-    with hidden.open("a") as file:
+    new_path = prepare_run_file(path.with_suffix(".new"))
+    with new_path.open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         # The file appears only with its lock.
-        hidden.replace(path)
+        new_path.replace(path)
         try:
             yield
         finally:
@@ -60,14 +60,14 @@ def locked_heartbeat_file(settings: Settings, name: str) -> Iterator[None]:
 
 def release_dead_workers(settings: Settings, store: Store) -> int:
     """Requeue the jobs of killed workers of this home. Returns their number."""
-    given_back = 0
+    job_count = 0
     for path in sorted((settings.home / "run").glob("*.alive")):
         with suppress(OSError), prepare_run_file(path).open("a") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            given_back += jobs.release_worker(store, path.stem)
+            job_count += jobs.release_worker(store, path.stem)
             workers.delete_heartbeat(store, path.stem)
             path.unlink(missing_ok=True)
-    return given_back
+    return job_count
 
 
 def is_worker_running(settings: Settings) -> bool:

@@ -48,8 +48,8 @@ def print_event(event: str, sentence: str) -> None:
     if sys.stdout.isatty():
         print(sentence, flush=True)
     else:
-        told = {"event": event, "message": sentence, "timestamp": datetime.now(UTC).isoformat()}
-        print(json.dumps(told), flush=True)
+        fields = {"event": event, "message": sentence, "timestamp": datetime.now(UTC).isoformat()}
+        print(json.dumps(fields), flush=True)
 
 
 def _build_renderers() -> list[Processor]:

@@ -44,9 +44,9 @@ class Notifier:
             return
         try:
             # Stored first: a claim skips a row that is being written, so an earlier notification would have no effect.
-            noted = mark_notified(self.store, lane, count)
+            notified_jobs = mark_notified(self.store, lane, count)
             if not self._publish(GRADE_TASK, lane.value, count):
-                mark_not_notified(self.store, noted)
+                mark_not_notified(self.store, notified_jobs)
         except SQLAlchemyError as error:
             _log.warning("notify.failed", task=GRADE_TASK, count=count, error=str(error))
 
@@ -65,14 +65,14 @@ class Notifier:
         accumulate while no worker runs.
         """
         requeue_lost_jobs(self.store, RetryPolicy(self.settings.backoff_seconds))
-        for lane, wanting in count_missing_notices(self.store, self.settings.notify_seconds).items():
-            self.grade(lane, min(wanting.stale, self._count_missing(lane.value, wanting.due)))
-        tried = test_runs.count_due_runs(self.store)
-        if tried:
-            self.notify_test_runs(self._count_missing(TEST_RUNS, tried))
-        waiting = plots.count_due_plots(self.store)
-        if waiting:
-            self.plot(self._count_missing(PLOTS, waiting))
+        for lane, missing_notices in count_missing_notices(self.store, self.settings.notify_seconds).items():
+            self.grade(lane, min(missing_notices.stale, self._count_missing(lane.value, missing_notices.due)))
+        due_runs = test_runs.count_due_runs(self.store)
+        if due_runs:
+            self.notify_test_runs(self._count_missing(TEST_RUNS, due_runs))
+        due_plots = plots.count_due_plots(self.store)
+        if due_plots:
+            self.plot(self._count_missing(PLOTS, due_plots))
 
     def waiting(self) -> int:
         """Return the number of notifications in the broker; 0 if it is unreachable."""

@@ -27,12 +27,12 @@ def start_process(
     command: Sequence[str],
     extra: Mapping[str, str],
     log: Path,
-    at_our_end: signal.Signals,
-    kept_open: Sequence[int] = (),
+    end_signal: signal.Signals,
+    descriptors: Sequence[int] = (),
 ) -> subprocess.Popen[bytes]:
-    """Start a child in a new session that gets the signal ``at_our_end`` when this thread ends for any reason.
+    """Start a child in a new session that gets the signal ``end_signal`` when this thread ends for any reason.
 
-    The child gets the variables ``extra`` in a clean environment and inherits only the descriptors ``kept_open``.
+    The child gets the variables ``extra`` in a clean environment and inherits only the descriptors ``descriptors``.
     Raises HostError if it cannot be started.
     """
     try:
@@ -46,8 +46,8 @@ def start_process(
                 stderr=output,
                 start_new_session=True,
                 umask=0o077,
-                pass_fds=tuple(kept_open),
-                preexec_fn=_end_with_parent(os.getpid(), at_our_end),
+                pass_fds=tuple(descriptors),
+                preexec_fn=_end_with_parent(os.getpid(), end_signal),
             )
     except OSError as error:
         raise HostError(f"{log} cannot be written, or {command[0]} not started: {error.strerror}") from None
@@ -57,10 +57,10 @@ def end_processes(processes: Sequence[subprocess.Popen[bytes]], grace_seconds: f
     """Terminate all processes, kill those that do not end in time, and wait for all."""
     for process in processes:
         process.terminate()
-    until = time.monotonic() + grace_seconds
+    deadline = time.monotonic() + grace_seconds
     for process in processes:
         try:
-            process.wait(timeout=max(0.0, until - time.monotonic()))
+            process.wait(timeout=max(0.0, deadline - time.monotonic()))
         except subprocess.TimeoutExpired:
             process.kill()
     for process in processes:

@@ -55,23 +55,23 @@ class KnownAnswer:
 
 def load_known_answer() -> KnownAnswer:
     """Return the expected result."""
-    told = json.loads(_ANSWER_FILE.read_text(encoding="utf-8"))
-    return KnownAnswer(told["marks"], tuple(told["chains"]))
+    document = json.loads(_ANSWER_FILE.read_text(encoding="utf-8"))
+    return KnownAnswer(document["marks"], tuple(document["chains"]))
 
 
 def run_self_test(runner: TrialRunner) -> KnownAnswer | None:
     """Grade the known submission; None if a limit of the machine cut it short. Raises HostError if grading fails."""
     submission, assignment = _load_question()
-    graded = grade(submission, assignment, runner=runner)
-    cut = any(trial.verdict in _CUT_SHORT_VERDICTS for trial in graded.trials) or any(
-        result.unjudged for result in graded.criteria
+    actual_grade = grade(submission, assignment, runner=runner)
+    is_cut_short = any(trial.verdict in _CUT_SHORT_VERDICTS for trial in actual_grade.trials) or any(
+        result.unjudged for result in actual_grade.criteria
     )
-    return None if cut else extract_answer(graded)
+    return None if is_cut_short else extract_answer(actual_grade)
 
 
-def extract_answer(graded: Grade) -> KnownAnswer:
+def extract_answer(actual_grade: Grade) -> KnownAnswer:
     """Return the marks of a grade, and the hash of each trial's recording."""
-    return KnownAnswer(str(graded.marks), tuple(trial.recording.sha256 for trial in graded.trials))
+    return KnownAnswer(str(actual_grade.marks), tuple(trial.recording.sha256 for trial in actual_grade.trials))
 
 
 def describe_difference(expected: KnownAnswer, actual: KnownAnswer) -> str:
@@ -95,10 +95,10 @@ class SelfTester:
     """
 
     def __init__(
-        self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, right: SelfTestRecord | None = None
+        self, store: Store, runner: TrialRunner, worker: str, every_seconds: float, record: SelfTestRecord | None = None
     ) -> None:
-        """Create a watch. ``right`` records a pass for processes that start later."""
-        self._right = right
+        """Create a watch. ``record`` records a pass for processes that start later."""
+        self._right = record
         self._store = store
         self._runner = runner
         self._worker = worker
@@ -154,15 +154,15 @@ class SelfTester:
             if actual is None:
                 _log.warning("self_test.unclear", reason="it was stopped by a limit of this machine")
                 return SelfTestResult.UNCLEAR
-            wrong = describe_difference(load_known_answer(), actual)
-            if not wrong:
+            difference = describe_difference(load_known_answer(), actual)
+            if not difference:
                 self_tests.record_pass(self._store, self._worker, os.getpid())
                 if self._right is not None:
                     self._right.note()
                 return SelfTestResult.RIGHT
             if self._right is not None:
                 self._right.forget()
-            spoilt = self_tests.quarantine_worker(self._store, self._worker, wrong)
+            quarantine = self_tests.quarantine_worker(self._store, self._worker, difference)
         except Exception:
             # Problems with the machine or the database are visible in the jobs themselves.
             _log.exception("self_test.unclear")
@@ -170,10 +170,10 @@ class SelfTester:
         _log.error(
             "worker.quarantined",
             worker=self._worker,
-            reason=wrong,
-            suspect_grades=len(spoilt.suspect),
-            graded_again=len(spoilt.again),
-            taken_back=spoilt.taken_back,
+            reason=difference,
+            suspect_grades=len(quarantine.suspect),
+            graded_again=len(quarantine.again),
+            taken_back=quarantine.taken_back,
         )
         return SelfTestResult.WRONG
 
@@ -181,7 +181,7 @@ class SelfTester:
 @cache
 def _load_question() -> tuple[Submission, Assignment]:
     assignment = read_assignment(KNOWN_ANSWER_FOLDER)
-    return read_submission(KNOWN_ANSWER_FOLDER / "submission", asked=assignment.parts), assignment
+    return read_submission(KNOWN_ANSWER_FOLDER / "submission", required_parts=assignment.parts), assignment
 
 
 def _format_hash_start(answer: KnownAnswer, number: int) -> str:

@@ -59,8 +59,8 @@ class SelfTestRecord:
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Prevent other processes of the home from running the self-test, within a time limit."""
-        until = time.monotonic() + _LONGEST_WAIT_SECONDS
-        while self._lock is None and not self._try_lock() and time.monotonic() < until:
+        deadline = time.monotonic() + _LONGEST_WAIT_SECONDS
+        while self._lock is None and not self._try_lock() and time.monotonic() < deadline:
             time.sleep(_POLL_SECONDS)
         try:
             yield
@@ -94,16 +94,16 @@ class SelfTestRecord:
 
 def open_self_test_record(folder: Path) -> SelfTestRecord:
     """Return the record of passed self-tests in ``folder``."""
-    asked = sorted(
+    question_files = sorted(
         file for file in KNOWN_ANSWER_FOLDER.rglob("*") if file.is_file() and file.suffix in (".py", ".toml", ".json")
     )
-    return SelfTestRecord(folder, b"".join(file.read_bytes() for file in asked))
+    return SelfTestRecord(folder, b"".join(file.read_bytes() for file in question_files))
 
 
 def _hash_build_and_machine(question: bytes) -> str:
     # Only the first processor, without its current clock rate. An empty line ends it.
-    first = _read_text(_PROCESSORS).partition("\n\n")[0].splitlines()
-    processor = [line for line in first if "MHz" not in line]
+    first_processor = _read_text(_PROCESSORS).partition("\n\n")[0].splitlines()
+    processor = [line for line in first_processor if "MHz" not in line]
     parts = [hash_grader(), platform.node(), *map(_read_text, _MACHINE), *processor]
     return hashlib.sha256(question + "\n".join(parts).encode()).hexdigest()[:32]
 

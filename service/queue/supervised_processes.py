@@ -33,11 +33,11 @@ _PING_SECONDS = 2.0
 class SupervisedProcess:
     """A process that is started when it does not run, with increasing delays after short lives."""
 
-    def __init__(self, command: Sequence[str], environment: dict[str, str], log: Path, kept_open: Sequence[int] = ()):
+    def __init__(self, command: Sequence[str], environment: dict[str, str], log: Path, descriptors: Sequence[int] = ()):
         self._command = command
         self._environment = environment
         self._log = log
-        self._kept_open = kept_open
+        self._kept_open = descriptors
         self._process: subprocess.Popen[bytes] | None = None
         self._begun = 0.0
         self._not_before = 0.0
@@ -58,9 +58,9 @@ class SupervisedProcess:
         if self._process is None or self._process.poll() is None:
             return False
         self._process = None
-        short = time.monotonic() - self._begun < _SHORT_LIFE_SECONDS
-        self.short_lives = self.short_lives + 1 if short else 0
-        wait = min(2.0 ** (self.short_lives - 1), _LONGEST_WAIT_SECONDS) if short else 0.0
+        is_short = time.monotonic() - self._begun < _SHORT_LIFE_SECONDS
+        self.short_lives = self.short_lives + 1 if is_short else 0
+        wait = min(2.0 ** (self.short_lives - 1), _LONGEST_WAIT_SECONDS) if is_short else 0.0
         self._not_before = time.monotonic() + wait
         return True
 
@@ -92,11 +92,11 @@ class SupervisedProcess:
         truncate_log(self._log)
 
 
-def stop_processes(supervised: Sequence[SupervisedProcess], grace_seconds: float) -> None:
+def stop_processes(processes: Sequence[SupervisedProcess], grace_seconds: float) -> None:
     """Stop processes permanently, in parallel."""
-    end_processes([each._process for each in supervised if each._process is not None], grace_seconds)
-    for each in supervised:
-        each._process = None
+    end_processes([each._process for each in processes if each._process is not None], grace_seconds)
+    for process in processes:
+        process._process = None
 
 
 class SupervisedWorker:
@@ -132,11 +132,11 @@ class SupervisedWorker:
         """Requeue the jobs of the ended worker, which cannot finish them any more. Returns their number."""
         if not self._name:
             return 0
-        given_back = jobs.release_worker(self._store, self._name)
+        job_count = jobs.release_worker(self._store, self._name)
         workers.delete_heartbeat(self._store, self._name)
         build_heartbeat_path(self._settings, self._name).unlink(missing_ok=True)
         self._name = ""
-        return given_back
+        return job_count
 
     def stop(self, grace_seconds: float) -> int:
         """Stop it permanently. Returns the number of requeued jobs."""
@@ -159,11 +159,11 @@ class SupervisedWorker:
         self._silent += min(moment - self._looked, _LONGEST_STEP_SECONDS)
         self._looked = moment
         try:
-            touched = build_heartbeat_path(self._settings, self._name).stat().st_mtime_ns
+            heartbeat_time = build_heartbeat_path(self._settings, self._name).stat().st_mtime_ns
         except OSError:
-            touched = 0
-        if touched != self._seen:
-            self._seen, self._silent = touched, 0.0
+            heartbeat_time = 0
+        if heartbeat_time != self._seen:
+            self._seen, self._silent = heartbeat_time, 0.0
         if self._silent < _SILENT_SECONDS:
             return False
         self._silent = 0.0

@@ -30,14 +30,14 @@ _SHORT_LIVES = 3
 class Supervisor:
     """Broker (unless configured externally), workers, and a web server on a listening socket (unless None)."""
 
-    def __init__(self, settings: Settings, store: Store, workers: int, listening: socket.socket | None) -> None:
+    def __init__(self, settings: Settings, store: Store, workers: int, web_socket: socket.socket | None) -> None:
         self._store = store
         self._broker = None if settings.broker_url else EmbeddedBroker(settings)
         self.settings = settings if self._broker is None else self._broker.settings
         logs = settings.home / "log"
         names = ["worker", *(f"worker-{number}" for number in range(2, workers + 1))]
         self.workers = [SupervisedWorker(self.settings, store, logs / f"{name}.log") for name in names]
-        self._web = [] if listening is None else [_build_web_server(self.settings, listening)]
+        self._web = [] if web_socket is None else [_build_web_server(self.settings, web_socket)]
 
     @property
     def is_ready(self) -> bool:
@@ -51,10 +51,10 @@ class Supervisor:
         for worker in self.workers:
             worker.ensure()
             worker.process.truncate_log_file()
-        for web in self._web:
-            web.detect_end()
-            web.start({})
-            web.truncate_log_file()
+        for web_server in self._web:
+            web_server.detect_end()
+            web_server.start({})
+            web_server.truncate_log_file()
 
     def describe_short_lived_process(self) -> str | None:
         """Return a sentence about a process that repeatedly ends right after its start; None if there is none."""
@@ -66,10 +66,10 @@ class Supervisor:
     def stop(self) -> int:
         """Stop everything that was started here. Returns the number of requeued jobs."""
         stop_processes([*(worker.process for worker in self.workers), *self._web], _GRACE_SECONDS)
-        given_back = sum(worker.release_jobs() for worker in self.workers)
+        job_count = sum(worker.release_jobs() for worker in self.workers)
         if self._broker is not None:
             self._broker.stop()
-        return given_back
+        return job_count
 
     def __enter__(self) -> Self:
         release_dead_workers(self.settings, self._store)
@@ -95,8 +95,8 @@ def locked_home(settings: Settings) -> Iterator[Callable[[str], None]]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 lock.seek(0)
-                found = " ".join(lock.read(400).split())
-                raise UsageError(f"robomark is already running in {settings.home} ({found})") from None
+                note_text = " ".join(lock.read(400).split())
+                raise UsageError(f"robomark is already running in {settings.home} ({note_text})") from None
 
             def leave(note: str) -> None:
                 lock.truncate(0)
@@ -109,7 +109,7 @@ def locked_home(settings: Settings) -> Iterator[Callable[[str], None]]:
         raise HostError(f"{path} cannot be used: {error.strerror}") from None
 
 
-def _build_web_server(settings: Settings, listening: socket.socket) -> SupervisedProcess:
-    number = listening.fileno()
+def _build_web_server(settings: Settings, web_socket: socket.socket) -> SupervisedProcess:
+    number = web_socket.fileno()
     command = build_python_command("-m", "service.web.server", str(number))
     return SupervisedProcess(command, settings.to_environment(), settings.home / "log" / "web.log", [number])

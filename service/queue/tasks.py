@@ -67,13 +67,13 @@ class _ChildHolder:
         from service.queue.self_test_record import SELF_TEST_ROLES, open_self_test_record
 
         settings = load_settings()
-        unsafe = current_app.conf.get(NO_SANDBOX)
-        group = None if unsafe else control_group.create_slot_group(settings.slot_memory_mb)
-        sandboxes = Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION, group)
+        is_unsafe = current_app.conf.get(NO_SANDBOX)
+        group = None if is_unsafe else control_group.create_slot_group(settings.slot_memory_mb)
+        sandboxes = Sandboxes(NO_ISOLATION if is_unsafe else FULL_ISOLATION, group)
         try:
             # They load their imports while this process continues.
-            right = open_self_test_record(settings.home / "run")
-            for role in SELF_TEST_ROLES if right.should_run_here() else ():
+            self_test_record = open_self_test_record(settings.home / "run")
+            for role in SELF_TEST_ROLES if self_test_record.should_run_here() else ():
                 sandboxes.begin(role, ())
             sandboxes.begin("robot", ())
             from service.grading.grader_locks import GraderLocks
@@ -86,7 +86,7 @@ class _ChildHolder:
         except BaseException:
             sandboxes.close()
             raise
-        watch = SelfTester(store, runner, read_worker_name(), settings.self_test_seconds, right)
+        watch = SelfTester(store, runner, read_worker_name(), settings.self_test_seconds, self_test_record)
         return PoolChild(settings, store, runner, watch)
 
     def drop(self) -> None:
@@ -126,8 +126,8 @@ def run_notified_test(task: WarmTask) -> None:
     child = task.child
     child.self_tester.repeat_in_thread()
     with child.self_tester.busy():
-        ran_well = run_next_test(child.store, child.settings, child.runner)
-    if not ran_well:
+        has_succeeded = run_next_test(child.store, child.settings, child.runner)
+    if not has_succeeded:
         # The error may have damaged an object that is reused.
         _child_holder.drop()
 

@@ -24,44 +24,44 @@ _log = structlog.get_logger(__name__)
 
 def run_next_test(store: Store, settings: Settings, runner: TrialRunner) -> bool:
     """Run the oldest test run, if there is one. Return False if a host fault ended it."""
-    claimed = test_runs.claim_test_run(store, settings.lease_seconds)
-    if claimed is None:
+    claim = test_runs.claim_test_run(store, settings.lease_seconds)
+    if claim is None:
         return True
-    with structlog.contextvars.bound_contextvars(tryout=claimed.id, attempt=claimed.attempt):
+    with structlog.contextvars.bound_contextvars(tryout=claim.id, attempt=claim.attempt):
         try:
-            _run_claimed(store, settings, runner, claimed)
+            _run_claimed(store, settings, runner, claim)
         except Cancelled as error:
             _log.info("tryout.stopped", reason=str(error))
         except UsageError as error:
-            test_runs.finish_test_run(store, claimed, {"refused": str(error)}, None)
+            test_runs.finish_test_run(store, claim, {"refused": str(error)}, None)
         except Exception:
             # This is never the student's fault: their faults are returned as verdicts.
             _log.exception("tryout.host_error")
             test_runs.fail_test_run(
                 store,
-                claimed,
+                claim,
                 "The test run failed because of a problem on the server, not in your program. Try again in a minute.",
             )
             return False
     return True
 
 
-def _run_claimed(store: Store, settings: Settings, runner: TrialRunner, claimed: ClaimedTestRun) -> None:
+def _run_claimed(store: Store, settings: Settings, runner: TrialRunner, claim: ClaimedTestRun) -> None:
     with store.reading() as session:
-        packed, content = test_runs.load_program(session, claimed.id)
+        packed_submission, content = test_runs.load_program(session, claim.id)
     assignment = assignment_from_bytes(content)
-    once = build_single_trial_assignment(assignment)
-    if once is None:
+    single_trial = build_single_trial_assignment(assignment)
+    if single_trial is None:
         raise UsageError(f"{assignment.id} has no test runs, because it has no visible robot run.")
 
-    impatient = store.with_short_wait()
+    short_wait_store = store.with_short_wait()
 
     def renew() -> None:
-        if not test_runs.renew_lease(impatient, claimed, settings.lease_seconds):
+        if not test_runs.renew_lease(short_wait_store, claim, settings.lease_seconds):
             raise Cancelled("another worker has claimed it")
 
     with LeaseKeeper(renew, settings.lease_seconds, settings.job_seconds) as keeper:
-        result = execute_test_run(unpack_submission(packed), once, runner, lambda _: keeper.check())
+        result = execute_test_run(unpack_submission(packed_submission), single_trial, runner, lambda _: keeper.check())
     if result.verdict is Verdict.HOST_ERROR:
         raise HostError("a trial ended because of a machine fault")
-    test_runs.finish_test_run(store, claimed, result.words, result.replay)
+    test_runs.finish_test_run(store, claim, result.words, result.replay)

@@ -44,24 +44,24 @@ _log = structlog.get_logger(__name__)
 QUARANTINED_STATUS = 3
 
 
-def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
+def run_worker(settings: Settings, *, is_unsafe: bool = False) -> int:
     """Work until stopped. Returns the exit status. ``settings.broker_url`` must be set.
 
-    ``unsafe`` disables the sandbox, which every grade records. Raises UsageError without a broker, HostError if the
+    ``is_unsafe`` disables the sandbox, which every grade records. Raises UsageError without a broker, HostError if the
     database is not usable or the sandbox for student code cannot be created.
     """
     if not settings.broker_url:
         raise UsageError("a worker needs a broker: set ROBOMARK_BROKER_URL")
     open_home(settings.home)
     leave_current_folder()
-    undivided = control_group.divide_group()
-    group = None if unsafe else control_group.create_slot_group(settings.slot_memory_mb)
+    obstacle = control_group.divide_group()
+    group = None if is_unsafe else control_group.create_slot_group(settings.slot_memory_mb)
     configure_logging(settings.log_level)
-    _log.info("worker.control_group", not_used_because=undivided)
-    with Sandboxes(NO_ISOLATION if unsafe else FULL_ISOLATION, group) as sandboxes:
+    _log.info("worker.control_group", not_used_because=obstacle)
+    with Sandboxes(NO_ISOLATION if is_unsafe else FULL_ISOLATION, group) as sandboxes:
         sandboxes.begin("robot", ())
         app = make_celery(settings)
-        app.conf[NO_SANDBOX] = unsafe
+        app.conf[NO_SANDBOX] = is_unsafe
         app.finalize()
         # Celery's worker. The sandbox is checked after this import, so that the zygote can start meanwhile.
         celery_worker = app.Worker
@@ -78,12 +78,12 @@ def run_worker(settings: Settings, *, unsafe: bool = False) -> int:
     ):
         # A shared lock: a home can have several workers, and others only check whether any is alive.
         fcntl.flock(lock, fcntl.LOCK_SH)
-        described = WorkerDescription(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, sandbox)
-        add_steps(app, store, settings, described, build_heartbeat_path(settings, name))
+        description = WorkerDescription(name, socket.gethostname(), settings.concurrency, GRADER_VERSION, sandbox)
+        add_steps(app, store, settings, description, build_heartbeat_path(settings, name))
         try:
             # Celery's command line would load all of its other commands first.
             worker = celery_worker(
-                hostname=f"{name}@{described.host}",
+                hostname=f"{name}@{description.host}",
                 pool_cls="prefork",
                 queues=QUEUES,
                 loglevel=logging.getLevelNamesMapping()[settings.log_level],

@@ -69,10 +69,10 @@ class _ConsumerMonitor:
 
     def check(self) -> None:
         """Check at each beat. Raises an error that makes Celery reconnect if the worker receives no messages."""
-        taken = state.all_total_count[0]
-        idle = not state.reserved_requests and not state.active_requests
-        deaf = idle and self._state.waiting > 0 and taken == self._taken
-        self._taken, self._beats = taken, self._beats + 1 if deaf else 0
+        message_count = state.all_total_count[0]
+        is_idle = not state.reserved_requests and not state.active_requests
+        is_deaf = is_idle and self._state.waiting > 0 and message_count == self._taken
+        self._taken, self._beats = message_count, self._beats + 1 if is_deaf else 0
         if self._beats >= _STALLED_BEATS:
             self._beats = 0
             raise BrokerGone("messages are queued, but none arrives")
@@ -185,9 +185,9 @@ class _HeartbeatStep(bootsteps.StartStopStep):
         # The consumer also waits up to a second for the broker's next message.
         client = create_broker_client(self.broker_url, _UNBLOCK_SECONDS)
         with suppress(RedisError, OSError), client:
-            for each in client.client_list():
-                if each["name"] == self.client_name:
-                    client.client_unblock(int(each["id"]))
+            for connection in client.client_list():
+                if connection["name"] == self.client_name:
+                    client.client_unblock(int(connection["id"]))
 
     def _record_beat(self) -> None:
         self.beat.at = time.monotonic()

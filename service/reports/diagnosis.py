@@ -63,8 +63,12 @@ def format_excerpt(diagnosis: Diagnosis) -> list[str]:
 
 def describe_outcome(grade: Grade, diagnosis: Diagnosis, language: Language = ENGLISH) -> str:
     """Describe how the grade's run ended and who caused it, without repeating the cause."""
-    words = describe_grade(grade, language)
-    return words.whose if words.happened in diagnosis.cause else f"{words.happened} {words.whose}"
+    verdict_words = describe_grade(grade, language)
+    return (
+        verdict_words.whose
+        if verdict_words.happened in diagnosis.cause
+        else f"{verdict_words.happened} {verdict_words.whose}"
+    )
 
 
 def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:
@@ -72,40 +76,44 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
 
     Excerpts need the ``submission``.
     """
-    words = describe_grade(grade, language)
+    verdict_words = describe_grade(grade, language)
     # Staff adjustments are described in the words of the person who made them.
-    graded = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
-    lost = {index: each for index, each in graded.items() if each.marks < each.max_marks}
+    automatic_criteria = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}
+    failed_criteria = {index: each for index, each in automatic_criteria.items() if each.marks < each.max_marks}
     if is_not_students_fault(grade.verdict):
-        return Diagnosis(words.happened, words.next_step)
+        return Diagnosis(verdict_words.happened, verdict_words.next_step)
     hints = format_hints(grade)
     if grade.criteria and grade.marks >= grade.max_marks:
         return _diagnose_full_marks(hints, submission, language)
     if hints:
-        return _diagnose_hint(grade, hints, lost, submission, language)
-    fault = _find_costly_fault(grade, lost)
+        return _diagnose_hint(grade, hints, failed_criteria, submission, language)
+    fault = _find_costly_fault(grade, failed_criteria)
     # A program that waits for an answer from a missing responder runs until the time limit.
-    waited_in_vain = bool(grade.missing) and fault is not None and fault.verdict is Verdict.TIME_LIMIT
-    if fault is not None and not waited_in_vain:
-        return _diagnose_fault(grade, fault, lost, submission, language)
+    has_waited_in_vain = bool(grade.missing) and fault is not None and fault.verdict is Verdict.TIME_LIMIT
+    if fault is not None and not has_waited_in_vain:
+        return _diagnose_fault(grade, fault, failed_criteria, submission, language)
     if grade.missing:
-        concerned = (index for index, each in lost.items() if grade.missing in each.message)
-        return Diagnosis(words.happened, words.next_step, lost=frozenset(concerned))
-    return _diagnose_criterion(grade, lost, language) if lost else Diagnosis(words.happened, words.next_step)
+        affected_indices = (index for index, each in failed_criteria.items() if grade.missing in each.message)
+        return Diagnosis(verdict_words.happened, verdict_words.next_step, lost=frozenset(affected_indices))
+    return (
+        _diagnose_criterion(grade, failed_criteria, language)
+        if failed_criteria
+        else Diagnosis(verdict_words.happened, verdict_words.next_step)
+    )
 
 
 def _diagnose_full_marks(hints: tuple[str, ...], submission: Submission | None, language: Language) -> Diagnosis:
     """Return the diagnosis for full marks, with what was accepted although it differs from the assignment."""
-    full = language.say(FULL_MARKS)
+    full_marks_text = language.say(FULL_MARKS)
     if not hints:
-        return Diagnosis(full, language.say("No changes needed."))
+        return Diagnosis(full_marks_text, language.say("No changes needed."))
     cause = language.say(
         "%(full)s Your submission differs from the assignment, but it was accepted: %(difference)s",
-        full=full,
+        full=full_marks_text,
         difference=hints[0],
     )
-    place = _PLACE.match(hints[0])
-    excerpt = _build_excerpt(submission, place[2], int(place[1])) if place is not None else None
+    place_match = _PLACE.match(hints[0])
+    excerpt = _build_excerpt(submission, place_match[2], int(place_match[1])) if place_match is not None else None
     step = language.say("No changes needed for the marks. Correct this if others use your program.")
     return Diagnosis(cause, step, hints[1:], excerpt)
 
@@ -113,7 +121,7 @@ def _diagnose_full_marks(hints: tuple[str, ...], submission: Submission | None, 
 def _diagnose_hint(
     grade: Grade,
     hints: tuple[str, ...],
-    lost: dict[int, CriterionResult],
+    failed_criteria: dict[int, CriterionResult],
     submission: Submission | None,
     language: Language,
 ) -> Diagnosis:
@@ -122,61 +130,66 @@ def _diagnose_hint(
         (each for each in _iterate_faults(grade) if to_display_text(each.message, 200).rstrip(".") in hint), None
     )
     if fault is not None:
-        with_it = _find_affected_criteria(grade, fault, lost)
+        affected_criteria = _find_affected_criteria(grade, fault, failed_criteria)
     elif _NEAR_MISS.search(hint):
         texts = _QUOTED.findall(hint)
-        with_it = frozenset(index for index, each in lost.items() if any(text in each.message for text in texts))
+        affected_criteria = frozenset(
+            index for index, each in failed_criteria.items() if any(text in each.message for text in texts)
+        )
     else:
-        with_it = frozenset(index for index, each in lost.items() if not each.marks)
-    place = _PLACE.match(hint)
-    if place is None:
+        affected_criteria = frozenset(index for index, each in failed_criteria.items() if not each.marks)
+    place_match = _PLACE.match(hint)
+    if place_match is None:
         step = language.say("Fix this first, then submit again.")
-        return Diagnosis(hint, step, hints[1:], lost=with_it)
-    line, name = int(place[1]), place[2]
+        return Diagnosis(hint, step, hints[1:], lost=affected_criteria)
+    line, name = int(place_match[1]), place_match[2]
     step = language.say(
         "Fix line %(line)s of %(file)s, run it without submitting, then submit again.",
         line=line,
         file=name,
     )
-    return Diagnosis(hint, step, hints[1:], _build_excerpt(submission, name, line), lost=with_it)
+    return Diagnosis(hint, step, hints[1:], _build_excerpt(submission, name, line), lost=affected_criteria)
 
 
 def _diagnose_fault(
     grade: Grade,
     fault: Fault,
-    lost: dict[int, CriterionResult],
+    failed_criteria: dict[int, CriterionResult],
     submission: Submission | None,
     language: Language,
 ) -> Diagnosis:
     step = describe_grade(grade, language).next_step
     if fault.verdict is Verdict.TIME_LIMIT:
-        words = describe_verdict(fault.verdict, language)
-        return Diagnosis(words.happened, words.next_step, lost=_find_affected_criteria(grade, fault, lost))
+        verdict_words = describe_verdict(fault.verdict, language)
+        return Diagnosis(
+            verdict_words.happened, verdict_words.next_step, lost=_find_affected_criteria(grade, fault, failed_criteria)
+        )
     groups = group_faults(grade, submission, language=language)
     group = next(each for each in groups if each.message == to_display_text(fault.message, 600))
     hint = f" {group.hint}" if group.hint else ""
     cause = f"{group.where}: {group.message.rstrip('.')}.{hint}"
     excerpt = Excerpt(group.where, group.excerpt) if group.excerpt else None
-    return Diagnosis(cause, step, excerpt=excerpt, lost=_find_affected_criteria(grade, fault, lost))
+    return Diagnosis(cause, step, excerpt=excerpt, lost=_find_affected_criteria(grade, fault, failed_criteria))
 
 
-def _diagnose_criterion(grade: Grade, lost: dict[int, CriterionResult], language: Language) -> Diagnosis:
-    main = max(lost, key=lambda index: lost[index].max_marks - lost[index].marks)
-    result = lost[main]
-    with_it = {index for index, each in lost.items() if _has_same_failure(grade, result, each)}
+def _diagnose_criterion(grade: Grade, failed_criteria: dict[int, CriterionResult], language: Language) -> Diagnosis:
+    main_index = max(failed_criteria, key=lambda index: failed_criteria[index].max_marks - failed_criteria[index].marks)
+    result = failed_criteria[main_index]
+    affected_criteria = {index for index, each in failed_criteria.items() if _has_same_failure(grade, result, each)}
     step = describe_grade(grade, language).next_step
     cause = describe_finding(grade, result, language) + _describe_practice_finding(grade, result, language)
-    return Diagnosis(cause, step, lost=frozenset({main, *with_it}))
+    return Diagnosis(cause, step, lost=frozenset({main_index, *affected_criteria}))
 
 
 def _describe_practice_finding(grade: Grade, result: CriterionResult, language: Language) -> str:
     """Return the findings of an unmarked criterion, if nothing on the marked one may be shown."""
     if _list_failures(result):
         return ""
-    seen = (each for each in grade.criteria if not each.max_marks and _list_failures(each))
-    told = (describe_finding(grade, each, language) for each in seen)
+    practice_criteria = (each for each in grade.criteria if not each.max_marks and _list_failures(each))
+    findings = (describe_finding(grade, each, language) for each in practice_criteria)
     return next(
-        (" " + language.say("From a criterion for practice (not marked): %(found)s", found=each) for each in told), ""
+        (" " + language.say("From a criterion for practice (not marked): %(found)s", found=each) for each in findings),
+        "",
     )
 
 
@@ -189,37 +202,37 @@ def describe_finding(grade: Grade, result: CriterionResult, language: Language =
     if result.set_by_hand is not None:
         return to_display_text(result.message, 1000, lines=12)
     accuracy = result.accuracy
-    wrong = _list_confusions(result)
-    if accuracy is not None and wrong:
-        return _describe_confusions(accuracy, wrong, language)
-    failed = next((each for each in _list_failures(result) if each.message), None)
-    if failed is None:
+    confusions = _list_confusions(result)
+    if accuracy is not None and confusions:
+        return _describe_confusions(accuracy, confusions, language)
+    failure = next((each for each in _list_failures(result) if each.message), None)
+    if failure is None:
         return to_display_text(result.message, 600, lines=6)
-    told = to_display_text(failed.message, 600, lines=6)
-    if failed.t is None:
-        return told
-    if not failed.t or f"{failed.t:.2f} s" in told:
-        return told + _describe_scenario(grade, failed, language)
-    at = language.say("%(found)s, at %(seconds)s s.", found=told.rstrip("."), seconds=f"{failed.t:.2f}")
-    return at + _describe_scenario(grade, failed, language)
+    finding = to_display_text(failure.message, 600, lines=6)
+    if failure.t is None:
+        return finding
+    if not failure.t or f"{failure.t:.2f} s" in finding:
+        return finding + _describe_scenario(grade, failure, language)
+    timed_finding = language.say("%(found)s, at %(seconds)s s.", found=finding.rstrip("."), seconds=f"{failure.t:.2f}")
+    return timed_finding + _describe_scenario(grade, failure, language)
 
 
-def _describe_confusions(accuracy: Accuracy, wrong: Sequence[tuple[str, str]], language: Language) -> str:
-    right, of = count_correct(accuracy, language)
-    taken = [
+def _describe_confusions(accuracy: Accuracy, confusions: Sequence[tuple[str, str]], language: Language) -> str:
+    correct_count, unit = count_correct(accuracy, language)
+    confusion_texts = [
         language.say(
             "“%(truth)s” was identified as “%(answer)s”", truth=to_one_line(truth, 60), answer=to_one_line(answer, 60)
         )
-        for truth, answer in wrong[:2]
+        for truth, answer in confusions[:2]
     ]
-    examples = language.say(" and ").join(taken)
-    if len(wrong) > len(taken):
+    examples = language.say(" and ").join(confusion_texts)
+    if len(confusions) > len(confusion_texts):
         examples = language.say("%(examples)s, among others", examples=examples)
     return language.say(
         "%(right)s of %(all)s %(of)s were identified correctly: %(examples)s.",
-        right=right,
+        right=correct_count,
         all=accuracy.n,
-        of=of,
+        of=unit,
         examples=examples,
     )
 
@@ -228,19 +241,19 @@ def _describe_scenario(grade: Grade, evidence: Evidence, language: Language) -> 
     if not 0 <= evidence.trial < len(grade.trials) or len(grade.trials) == 1:
         return ""
     trial = grade.trials[evidence.trial]
-    several = sum(each.scenario == trial.scenario for each in grade.trials) > 1
-    where = format_trial_name(trial, language) if several else to_one_line(trial.scenario, 60)
-    return " " + language.say("Scenario: %(where)s.", where=where)
+    has_several_trials = sum(each.scenario == trial.scenario for each in grade.trials) > 1
+    scenario_name = format_trial_name(trial, language) if has_several_trials else to_one_line(trial.scenario, 60)
+    return " " + language.say("Scenario: %(where)s.", where=scenario_name)
 
 
-def _find_costly_fault(grade: Grade, lost: dict[int, CriterionResult]) -> Fault | None:
+def _find_costly_fault(grade: Grade, failed_criteria: dict[int, CriterionResult]) -> Fault | None:
     """Return the first fault. A time limit counts only if a criterion names it, because alone it costs nothing."""
-    told = [each.message for result in lost.values() for each in _list_failures(result)]
+    failure_messages = [each.message for result in failed_criteria.values() for each in _list_failures(result)]
     return next(
         (
             fault
             for fault in _iterate_faults(grade)
-            if fault.verdict is not Verdict.TIME_LIMIT or any(fault.message in message for message in told)
+            if fault.verdict is not Verdict.TIME_LIMIT or any(fault.message in message for message in failure_messages)
         ),
         None,
     )
@@ -250,18 +263,20 @@ def _iterate_faults(grade: Grade) -> Iterator[Fault]:
     return (fault for trial in grade.trials for fault in collect_faults(trial.recording))
 
 
-def _find_affected_criteria(grade: Grade, fault: Fault, lost: dict[int, CriterionResult]) -> frozenset[int]:
+def _find_affected_criteria(grade: Grade, fault: Fault, failed_criteria: dict[int, CriterionResult]) -> frozenset[int]:
     """Return the criteria that failed only in trials with this fault, and not before it."""
-    when = {
-        index: min(each.t for each in same)
+    fault_times = {
+        index: min(each.t for each in trial_faults)
         for index, trial in enumerate(grade.trials)
-        if (same := [each for each in collect_faults(trial.recording) if each.message == fault.message])
+        if (trial_faults := [each for each in collect_faults(trial.recording) if each.message == fault.message])
     }
     return frozenset(
         index
-        for index, result in lost.items()
-        if (failed := _list_failures(result))
-        and all(each.trial in when and _is_after_fault(each, when[each.trial], fault) for each in failed)
+        for index, result in failed_criteria.items()
+        if (failures := _list_failures(result))
+        and all(
+            each.trial in fault_times and _is_after_fault(each, fault_times[each.trial], fault) for each in failures
+        )
     )
 
 
@@ -269,21 +284,21 @@ def _is_after_fault(evidence: Evidence, t: float, fault: Fault) -> bool:
     return evidence.t is None or evidence.t >= t - 0.05 or fault.message in evidence.message
 
 
-def _has_same_failure(grade: Grade, one: CriterionResult, other: CriterionResult) -> bool:
+def _has_same_failure(grade: Grade, result: CriterionResult, other_result: CriterionResult) -> bool:
     """Return whether two criteria lost marks by the same mistake: equal confusions, or the same moment of the run."""
-    confused = _list_confusions(one)
-    if confused or _list_confusions(other):
-        return set(confused) == set(_list_confusions(other))
-    return bool(set(_iterate_failure_times(grade, one)) & set(_iterate_failure_times(grade, other)))
+    confusions = _list_confusions(result)
+    if confusions or _list_confusions(other_result):
+        return set(confusions) == set(_list_confusions(other_result))
+    return bool(set(_iterate_failure_times(grade, result)) & set(_iterate_failure_times(grade, other_result)))
 
 
 def _iterate_failure_times(grade: Grade, result: CriterionResult) -> Iterator[tuple[int, float]]:
     """Yield trial and time of each failure before the end. At the end, unrelated failures coincide."""
-    for each in _list_failures(result):
-        if each.t is None or not 0 <= each.trial < len(grade.trials):
+    for failure in _list_failures(result):
+        if failure.t is None or not 0 <= failure.trial < len(grade.trials):
             continue
-        if 0 < each.t < grade.trials[each.trial].recording.end_t - 0.05:
-            yield each.trial, round(each.t, 2)
+        if 0 < failure.t < grade.trials[failure.trial].recording.end_t - 0.05:
+            yield failure.trial, round(failure.t, 2)
 
 
 def _list_confusions(result: CriterionResult) -> list[tuple[str, str]]:

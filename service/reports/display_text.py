@@ -22,23 +22,27 @@ def to_display_text(text: str, limit: int = 2000, *, lines: int = 40) -> str:
     Control characters, bidirectional overrides, lone surrogates and similar become escapes such as ``\x1b`` and
     ``\u202e``. Line feeds stay, and tabs become four spaces. A note at the end says how much was cut.
     """
-    head = text[:limit]
-    kept = head.replace("\r\n", "\n").split("\n")[:lines]
-    shown = "\n".join(_escape_invisible(line) for line in kept)
-    if len(shown) > 6 * limit:  # escapes are longer than the characters they replace
-        shown = shown[: 6 * limit]
-    missing_lines = text.count("\n") + 1 - len(kept)
+    start_text = text[:limit]
+    kept_lines = start_text.replace("\r\n", "\n").split("\n")[:lines]
+    visible_text = "\n".join(_escape_invisible(line) for line in kept_lines)
+    if len(visible_text) > 6 * limit:  # escapes are longer than the characters they replace
+        visible_text = visible_text[: 6 * limit]
+    missing_lines = text.count("\n") + 1 - len(kept_lines)
     if len(text) > limit:
-        return f"{shown}… ({len(text) - limit:,} more characters)"
+        return f"{visible_text}… ({len(text) - limit:,} more characters)"
     if missing_lines > 0:
-        return f"{shown}\n… ({missing_lines:,} more lines)"
-    return shown
+        return f"{visible_text}\n… ({missing_lines:,} more lines)"
+    return visible_text
 
 
 def to_one_line(text: str, limit: int = 120) -> str:
     """Return ``text`` on one line, at most ``limit`` characters, with an ellipsis if it was cut."""
-    spelled = _escape_invisible(re.sub(r"\s*[\r\n]\s*", " ⏎ ", text[: 4 * limit + 4].strip()))
-    return spelled if len(spelled) <= limit and len(text) <= 4 * limit else spelled[: limit - 1].rstrip() + "…"
+    visible_text = _escape_invisible(re.sub(r"\s*[\r\n]\s*", " ⏎ ", text[: 4 * limit + 4].strip()))
+    return (
+        visible_text
+        if len(visible_text) <= limit and len(text) <= 4 * limit
+        else visible_text[: limit - 1].rstrip() + "…"
+    )
 
 
 def join_wrapped_lines(text: str) -> str:
@@ -65,8 +69,8 @@ def format_heading(heading: float) -> str:
 
 def format_decimal(value: Decimal) -> str:
     """Return marks as people write them: ``4``, ``2.5``, never ``4.00`` or ``0E+1``."""
-    plain = f"{value:f}"
-    return plain.rstrip("0").rstrip(".") if "." in plain else plain
+    digits = f"{value:f}"
+    return digits.rstrip("0").rstrip(".") if "." in digits else digits
 
 
 def to_json_number(value: Decimal) -> int | float:

@@ -59,61 +59,66 @@ def describe_other_faults(
 ) -> Iterator[tuple[str, FaultGroup]]:
     """Yield each fault with its description, shortened to the place if the cause already has its message."""
     for group in group_faults(grade, submission, limit=10):
-        told = group.message.rstrip(".") in cause
-        yield (group.where if told else f"{group.where}: {group.message}"), group
+        is_in_cause = group.message.rstrip(".") in cause
+        yield (group.where if is_in_cause else f"{group.where}: {group.message}"), group
 
 
 def group_faults(
     grade: Grade, submission: Submission | None = None, limit: int = 12, language: Language = ENGLISH
 ) -> tuple[FaultGroup, ...]:
     """Return at most ``limit`` different faults in order of first occurrence. Excerpts need a ``submission``."""
-    found: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
+    occurrences: dict[tuple[str, str, str], list[tuple[int, Fault]]] = {}
     for index, trial in enumerate(grade.trials):
         for fault in collect_faults(trial.recording):
-            found.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
-    return tuple(_build_group(grade, places, submission, language) for places in list(found.values())[:limit])
+            occurrences.setdefault((fault.who, fault.message, fault.place), []).append((index, fault))
+    return tuple(_build_group(grade, places, submission, language) for places in list(occurrences.values())[:limit])
 
 
 def describe_place(fault: Fault, language: Language = ENGLISH) -> str:
     """Return the position in the student's text: ``cell 7, line 3``, ``line 3 of helper.py``; empty if unknown."""
-    within = [fault.agent] if fault.agent else []
-    within += [language.say("cell %(number)s", number=fault.cell)] if fault.cell is not None else []
+    parts = [fault.agent] if fault.agent else []
+    parts += [language.say("cell %(number)s", number=fault.cell)] if fault.cell is not None else []
     if fault.line is not None and fault.file:
-        within.append(language.say("line %(number)s of %(file)s", number=fault.line, file=fault.file))
+        parts.append(language.say("line %(number)s of %(file)s", number=fault.line, file=fault.file))
     elif fault.line is not None:
-        within.append(language.say("line %(number)s", number=fault.line))
-    return ", ".join(within)
+        parts.append(language.say("line %(number)s", number=fault.line))
+    return ", ".join(parts)
 
 
 def _build_group(
-    grade: Grade, places: list[tuple[int, Fault]], submission: Submission | None, language: Language
+    grade: Grade, occurrences: list[tuple[int, Fault]], submission: Submission | None, language: Language
 ) -> FaultGroup:
-    index, fault = places[0]
+    index, fault = occurrences[0]
     source = _find_source(fault, submission)
     is_other_cell = source is not None and fault.cell is not None and find_magic_line(source.text) is None
-    who = translatable("Notebook") if is_other_cell and fault.who == "program" else _PARTY_TITLES[fault.who]
-    where = language.say("Agent %(name)s", name=fault.agent) if fault.agent else language.say(who)
+    party_title = translatable("Notebook") if is_other_cell and fault.who == "program" else _PARTY_TITLES[fault.who]
+    location = language.say("Agent %(name)s", name=fault.agent) if fault.agent else language.say(party_title)
     if source is not None and not fault.file:
-        where += f" ({to_one_line(source.name, 60)})"
-    place = describe_place(replace(fault, agent=""), language)
-    if place:
-        where += f", {place}"
-    first = language.say(
+        location += f" ({to_one_line(source.name, 60)})"
+    position = describe_place(replace(fault, agent=""), language)
+    if position:
+        location += f", {position}"
+    first_occurrence = language.say(
         "at %(seconds)s s in %(trial)s",
         seconds=f"{fault.t:.2f}",
         trial=format_trial_name(grade.trials[index], language),
     )
-    often = language.say(
+    frequency = language.say(
         "%(times)s times in %(trials)s of %(all)s trials, first %(first)s",
-        times=len(places),
-        trials=len({trial_index for trial_index, _ in places}),
+        times=len(occurrences),
+        trials=len({trial_index for trial_index, _ in occurrences}),
         all=len(grade.trials),
-        first=first,
+        first=first_occurrence,
     )
-    how_often = first if len(places) == 1 else often
+    how_often = first_occurrence if len(occurrences) == 1 else frequency
     excerpt = () if source is None or fault.line is None else extract_excerpt(source, fault.line)
     return FaultGroup(
-        fault.verdict, where, to_display_text(fault.message, 600), to_display_text(fault.hint, 600), how_often, excerpt
+        fault.verdict,
+        location,
+        to_display_text(fault.message, 600),
+        to_display_text(fault.hint, 600),
+        how_often,
+        excerpt,
     )
 
 
@@ -149,15 +154,15 @@ def _find_file(file: str, submission: Submission) -> SourceFile | None:
     return None
 
 
-def extract_excerpt(source: SourceFile, line: int, around: int = 2) -> tuple[SourceLine, ...]:
+def extract_excerpt(source: SourceFile, line: int, context_lines: int = 2) -> tuple[SourceLine, ...]:
     """Return the line and its neighbours; empty if the source has no such line."""
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()
-    first, last = max(1, line - around), min(len(lines), line + around)
-    while first < line and not lines[first - 1].strip():
-        first += 1
+    first_line, last_line = max(1, line - context_lines), min(len(lines), line + context_lines)
+    while first_line < line and not lines[first_line - 1].strip():
+        first_line += 1
     return tuple(
         SourceLine(number, to_display_text(lines[number - 1].rstrip("\r"), 200), number == line)
-        for number in range(first, last + 1)
+        for number in range(first_line, last_line + 1)
     )

@@ -74,14 +74,14 @@ class _Viewport:
 def render_film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
     """Return the trial as a GIF. ``own_floors`` are floors that are not built in, by name."""
     recording = trial.recording
-    sight = _choose_viewport(recording)
-    ground = _draw_ground(recording, own_floors.get(recording.background), sight)
+    viewport = _choose_viewport(recording)
+    ground = _draw_ground(recording, own_floors.get(recording.background), viewport)
     speed = max(1, math.ceil(recording.end_t * 1000 / FRAME_MILLISECONDS / (MOST_FRAMES - 1)))
-    palette = _build_palette(_draw_frames(trial, ground.copy(), sight, speed, (0.0, recording.end_t)))
+    palette = _build_palette(_draw_frames(trial, ground.copy(), viewport, speed, (0.0, recording.end_t)))
     moments = [*np.arange(0, recording.end_t, FRAME_MILLISECONDS / 1000 * speed).tolist(), recording.end_t]
     frames = (
         frame.quantize(palette=palette, dither=Image.Dither.NONE)
-        for frame in _draw_frames(trial, ground, sight, speed, moments)
+        for frame in _draw_frames(trial, ground, viewport, speed, moments)
     )
     durations = [FRAME_MILLISECONDS] * (len(moments) - 1) + [_LAST_FRAME_MILLISECONDS]
     stream = io.BytesIO()
@@ -92,70 +92,79 @@ def render_film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
 
 
 def _draw_frames(
-    trial: TrialResult, ground: Image.Image, sight: _Viewport, speed: int, moments: list[float] | tuple[float, ...]
+    trial: TrialResult, ground: Image.Image, viewport: _Viewport, speed: int, moments: list[float] | tuple[float, ...]
 ) -> Iterator[Image.Image]:
     """Yield a frame for each moment. Trails of the robots are drawn on ``ground``."""
     recording = trial.recording
-    words = _Caption(trial)
-    robots = [own for _, own in iterate_robots(recording)]
-    drawn, marked = 0, -math.inf
-    for number, t in enumerate(moments):
+    caption = _Caption(trial)
+    robot_recordings = [own for _, own in iterate_robots(recording)]
+    drawn_tick, marked_time = 0, -math.inf
+    for frame_number, t in enumerate(moments):
         tick = count_ticks_until(recording, t)
-        for which, own in enumerate(robots):
-            _draw_trail(ground, own, sight, drawn, tick, SECOND_ROBOT if which else LEFT)
-            _draw_touches(ground, own, sight, marked, t)
-        drawn, marked = tick, t
-        seen = ground.copy()
-        for which, own in enumerate(robots):
-            _draw_robot(seen, own, sight, tick, SECOND_ROBOT if which else INK)
-        frame = Image.new("RGB", (_WIDTH, sight.height + _STRIP), _PAPER)
-        frame.paste(seen)
-        _draw_caption_strip(frame, sight.height, t, recording.end_t, speed, words.at(t, number))
+        for robot_index, robot_recording in enumerate(robot_recordings):
+            _draw_trail(ground, robot_recording, viewport, drawn_tick, tick, SECOND_ROBOT if robot_index else LEFT)
+            _draw_touches(ground, robot_recording, viewport, marked_time, t)
+        drawn_tick, marked_time = tick, t
+        scene = ground.copy()
+        for robot_index, robot_recording in enumerate(robot_recordings):
+            _draw_robot(scene, robot_recording, viewport, tick, SECOND_ROBOT if robot_index else INK)
+        frame = Image.new("RGB", (_WIDTH, viewport.height + _STRIP), _PAPER)
+        frame.paste(scene)
+        _draw_caption_strip(frame, viewport.height, t, recording.end_t, speed, caption.at(t, frame_number))
         yield frame
 
 
 def _choose_viewport(recording: Recording) -> _Viewport:
     """Return the region that the robots visited, with a margin, in the aspect ratio of a screen."""
-    places = np.vstack([_collect_positions(own) for _, own in iterate_robots(recording)])
+    positions = np.vstack([_collect_positions(own) for _, own in iterate_robots(recording)])
     if recording.beacon is not None:
-        places = np.vstack((places, recording.beacon))
-    places = places[np.isfinite(places).all(axis=1)] if np.isfinite(places).any() else np.zeros((1, 2))
-    most = (_FLOOR_WIDTH + _BEYOND, _FLOOR_HEIGHT + _BEYOND)
-    low = np.clip(places.min(axis=0), -_BEYOND, most) - _MARGIN
-    high = np.clip(places.max(axis=0), -_BEYOND, most) + _MARGIN
-    across, up = (high - low).tolist()
-    height = round(min(max(_WIDTH * up / across, _LOWEST), _HIGHEST))
-    scale = min(_WIDTH / max(across, _CLOSEST), height / up)
+        positions = np.vstack((positions, recording.beacon))
+    positions = positions[np.isfinite(positions).all(axis=1)] if np.isfinite(positions).any() else np.zeros((1, 2))
+    upper_limit = (_FLOOR_WIDTH + _BEYOND, _FLOOR_HEIGHT + _BEYOND)
+    low = np.clip(positions.min(axis=0), -_BEYOND, upper_limit) - _MARGIN
+    high = np.clip(positions.max(axis=0), -_BEYOND, upper_limit) + _MARGIN
+    span_x, span_y = (high - low).tolist()
+    height = round(min(max(_WIDTH * span_y / span_x, _LOWEST), _HIGHEST))
+    scale = min(_WIDTH / max(span_x, _CLOSEST), height / span_y)
     middle_x, middle_y = ((low + high) / 2).tolist()
     return _Viewport(middle_x - _WIDTH / scale / 2, middle_y + height / scale / 2, scale, height)
 
 
-def _collect_positions(own: Recording) -> NDArray[np.float64]:
-    start = np.array([[own.start.x, own.start.y]])
-    return np.vstack((start, np.column_stack((own.ticks.x, own.ticks.y))))
+def _collect_positions(recording: Recording) -> NDArray[np.float64]:
+    start = np.array([[recording.start.x, recording.start.y]])
+    return np.vstack((start, np.column_stack((recording.ticks.x, recording.ticks.y))))
 
 
-def _draw_ground(recording: Recording, own: Pixels | None, sight: _Viewport) -> Image.Image:
+def _draw_ground(recording: Recording, own_floor: Pixels | None, viewport: _Viewport) -> Image.Image:
     """Return the floor of the trial with its obstacles; white if the floor image is not available any more."""
-    ground = Image.new("RGB", (_WIDTH, sight.height), _OFF_THE_FLOOR)
-    built_in = rebuild_floor(recording) if own is None else None
-    pixels = own if built_in is None else built_in.pixels
+    ground = Image.new("RGB", (_WIDTH, viewport.height), _OFF_THE_FLOOR)
+    built_in = rebuild_floor(recording) if own_floor is None else None
+    pixels = own_floor if built_in is None else built_in.pixels
     if pixels is None:
         pixels = np.full((_FLOOR_HEIGHT, _FLOOR_WIDTH, 3), 255, np.uint8)
     image = Image.fromarray(np.ascontiguousarray(pixels[:, :, :3]))
-    per = image.width / _FLOOR_WIDTH
-    left, right = (min(max(x, 0.0), _FLOOR_WIDTH) for x in (sight.left, sight.left + _WIDTH / sight.scale))
-    bottom, top = (min(max(y, 0.0), _FLOOR_HEIGHT) for y in (sight.top - sight.height / sight.scale, sight.top))
-    corner, far = sight.at(left, top), sight.at(right, bottom)
-    size = (max(1, round(far[0]) - round(corner[0])), max(1, round(far[1]) - round(corner[1])))
-    box = (left * per, (_FLOOR_HEIGHT - top) * per, right * per, (_FLOOR_HEIGHT - bottom) * per)
+    pixels_per_mm = image.width / _FLOOR_WIDTH
+    left, right = (min(max(x, 0.0), _FLOOR_WIDTH) for x in (viewport.left, viewport.left + _WIDTH / viewport.scale))
+    bottom, top = (
+        min(max(y, 0.0), _FLOOR_HEIGHT) for y in (viewport.top - viewport.height / viewport.scale, viewport.top)
+    )
+    corner, opposite_corner = viewport.at(left, top), viewport.at(right, bottom)
+    size = (max(1, round(opposite_corner[0]) - round(corner[0])), max(1, round(opposite_corner[1]) - round(corner[1])))
+    box = (
+        left * pixels_per_mm,
+        (_FLOOR_HEIGHT - top) * pixels_per_mm,
+        right * pixels_per_mm,
+        (_FLOOR_HEIGHT - bottom) * pixels_per_mm,
+    )
     if right > left and top > bottom:
         ground.paste(image.resize(size, Image.Resampling.LANCZOS, box=box), (round(corner[0]), round(corner[1])))
     draw = ImageDraw.Draw(ground)
-    for x, y, wide, high in recording.obstacles:
-        draw.rectangle((*sight.at(x, y + high), *sight.at(x + wide, y)), fill=_OBSTACLE, outline=INK)
+    for x, y, obstacle_width, obstacle_height in recording.obstacles:
+        draw.rectangle(
+            (*viewport.at(x, y + obstacle_height), *viewport.at(x + obstacle_width, y)), fill=_OBSTACLE, outline=INK
+        )
     if recording.beacon is not None:
-        x, y = sight.at(*recording.beacon)
+        x, y = viewport.at(*recording.beacon)
         points = [
             (x + (4.5 if point % 2 else 11) * math.sin(point * math.pi / 5),
              y - (4.5 if point % 2 else 11) * math.cos(point * math.pi / 5))
@@ -166,83 +175,95 @@ def _draw_ground(recording: Recording, own: Pixels | None, sight: _Viewport) -> 
     return ground
 
 
-def _draw_trail(ground: Image.Image, own: Recording, sight: _Viewport, since: int, until: int, colour: str) -> None:
+def _draw_trail(
+    ground: Image.Image, recording: Recording, viewport: _Viewport, start_tick: int, end_tick: int, colour: str
+) -> None:
     """Draw the path from one tick to the other, and the pen strokes on it."""
-    until = min(until, len(own.ticks))
-    if until <= since:
+    end_tick = min(end_tick, len(recording.ticks))
+    if end_tick <= start_tick:
         return
-    way = _project_positions(own, sight, since, until)
-    with _Layer(ground, way) as layer:
-        for down, up in _list_pen_strokes(own):
-            if max(since, down) < min(until, up):
-                pen = _project_positions(own, sight, max(since, down), min(until, up))
-                layer.line(pen, PEN, max(7.0, 8 * sight.scale))
-        layer.line(way, _PAPER, 4)
-        layer.line(way, colour, 2)
+    trail = _project_positions(recording, viewport, start_tick, end_tick)
+    with _Layer(ground, trail) as layer:
+        for pen_down_tick, pen_up_tick in _list_pen_strokes(recording):
+            if max(start_tick, pen_down_tick) < min(end_tick, pen_up_tick):
+                stroke = _project_positions(
+                    recording, viewport, max(start_tick, pen_down_tick), min(end_tick, pen_up_tick)
+                )
+                layer.line(stroke, PEN, max(7.0, 8 * viewport.scale))
+        layer.line(trail, _PAPER, 4)
+        layer.line(trail, colour, 2)
 
 
-def _project_positions(own: Recording, sight: _Viewport, since: int, until: int) -> list[Point]:
+def _project_positions(recording: Recording, viewport: _Viewport, start_tick: int, end_tick: int) -> list[Point]:
     """Return the robot's known positions on the frame, from one tick to the other."""
-    poses = (get_pose_after(own, tick) for tick in range(since, until + 1))
-    return [sight.at(pose.x, pose.y) for pose in poses if math.isfinite(pose.x + pose.y)]
+    poses = (get_pose_after(recording, tick) for tick in range(start_tick, end_tick + 1))
+    return [viewport.at(pose.x, pose.y) for pose in poses if math.isfinite(pose.x + pose.y)]
 
 
-def _list_pen_strokes(own: Recording) -> list[tuple[int, int]]:
+def _list_pen_strokes(recording: Recording) -> list[tuple[int, int]]:
     """Return the ticks at which the pen goes down and up, as pairs."""
     strokes: list[tuple[int, int]] = []
-    since = None
-    for tick, down in (*own.pen, (len(own.ticks), False)):
-        if down and since is None:
-            since = tick
-        elif not down and since is not None:
-            strokes.append((since, tick))
-            since = None
+    start_tick = None
+    for tick, is_down in (*recording.pen, (len(recording.ticks), False)):
+        if is_down and start_tick is None:
+            start_tick = tick
+        elif not is_down and start_tick is not None:
+            strokes.append((start_tick, tick))
+            start_tick = None
     return strokes
 
 
-def _draw_touches(ground: Image.Image, own: Recording, sight: _Viewport, since: float, until: float) -> None:
-    """Draw a cross for each touch after ``since`` up to ``until``."""
-    for touch in own.touches:
-        if since < touch.t <= until and math.isfinite(touch.pose.x + touch.pose.y):
-            x, y = sight.at(touch.pose.x, touch.pose.y)
-            for way in ([(x - 6, y - 6), (x + 6, y + 6)], [(x - 6, y + 6), (x + 6, y - 6)]):
-                with _Layer(ground, way) as layer:
-                    layer.line(way, FAULT, 2.5)
+def _draw_touches(
+    ground: Image.Image, recording: Recording, viewport: _Viewport, start_time: float, end_time: float
+) -> None:
+    """Draw a cross for each touch after ``start_time`` up to ``end_time``."""
+    for touch in recording.touches:
+        if start_time < touch.t <= end_time and math.isfinite(touch.pose.x + touch.pose.y):
+            x, y = viewport.at(touch.pose.x, touch.pose.y)
+            for stroke in ([(x - 6, y - 6), (x + 6, y + 6)], [(x - 6, y + 6), (x + 6, y - 6)]):
+                with _Layer(ground, stroke) as layer:
+                    layer.line(stroke, FAULT, 2.5)
 
 
-def _draw_robot(frame: Image.Image, own: Recording, sight: _Viewport, tick: int, colour: str) -> None:
-    body, pose = get_recorded_robot(own), get_pose_after(own, tick)
+def _draw_robot(frame: Image.Image, recording: Recording, viewport: _Viewport, tick: int, colour: str) -> None:
+    body, pose = get_recorded_robot(recording), get_pose_after(recording, tick)
     if not math.isfinite(pose.x + pose.y + pose.heading):
         return
-    place = _RobotFrame(pose, sight)
-    row = min(tick, len(own.ticks)) - 1
-    distance = float(own.ticks.ultrasonic[row]) if row >= 0 else math.nan
-    ray = [place.at(0, body.ultrasonic_y), place.at(0, body.ultrasonic_y + distance)]
-    seen = ray if distance < _ULTRASONIC_LIMIT else []
-    outline = place.build_rounded_outline(-body.half_width, body.back, body.half_width, body.front, 12)
-    with _Layer(frame, [*outline, *seen]) as layer:
-        if seen:
+    robot_frame = _RobotFrame(pose, viewport)
+    row = min(tick, len(recording.ticks)) - 1
+    distance = float(recording.ticks.ultrasonic[row]) if row >= 0 else math.nan
+    ray = [robot_frame.at(0, body.ultrasonic_y), robot_frame.at(0, body.ultrasonic_y + distance)]
+    visible_ray = ray if distance < _ULTRASONIC_LIMIT else []
+    outline = robot_frame.build_rounded_outline(-body.half_width, body.back, body.half_width, body.front, 12)
+    with _Layer(frame, [*outline, *visible_ray]) as layer:
+        if visible_ray:
             layer.dashes(ray[0], ray[1], _RAY, 1.5)
             layer.dot(ray[1], 3.5, _RAY)
         layer.polygon(outline, "#ffffffb4", colour, 1.8)
         wheel = body.wheel_diameter
         for side in (-1, 1):
-            middle = side * body.wheel_spacing / 2
+            wheel_centre = side * body.wheel_spacing / 2
             layer.polygon(
-                place.build_rounded_outline(middle - 0.18 * wheel, -wheel / 2, middle + 0.18 * wheel, wheel / 2, 4), INK
+                robot_frame.build_rounded_outline(
+                    wheel_centre - 0.18 * wheel, -wheel / 2, wheel_centre + 0.18 * wheel, wheel / 2, 4
+                ),
+                INK,
             )
-        lights = ((body.left_light, own.ticks.left_rgb, LEFT), (body.right_light, own.ticks.right_rgb, RIGHT))
+        lights = (
+            (body.left_light, recording.ticks.left_rgb, LEFT),
+            (body.right_light, recording.ticks.right_rgb, RIGHT),
+        )
         for sensor, column, edge in lights:
-            layer.dot(place.at(sensor.x, sensor.y), _compute_light_radius(sensor, sight) + 1.6, edge)
-            known = row >= 0 and bool(np.isfinite(column[row]).all())
-            light = tuple(np.clip(column[row], 0, 255).astype(int).tolist()) if known else (255, 255, 255)
-            layer.dot(place.at(sensor.x, sensor.y), _compute_light_radius(sensor, sight), light)
-        layer.dot(place.at(0, 0), 4, _PAPER)
-        layer.dot(place.at(0, 0), 2.6, colour)
+            layer.dot(robot_frame.at(sensor.x, sensor.y), _compute_light_radius(sensor, viewport) + 1.6, edge)
+            has_reading = row >= 0 and bool(np.isfinite(column[row]).all())
+            light = tuple(np.clip(column[row], 0, 255).astype(int).tolist()) if has_reading else (255, 255, 255)
+            layer.dot(robot_frame.at(sensor.x, sensor.y), _compute_light_radius(sensor, viewport), light)
+        layer.dot(robot_frame.at(0, 0), 4, _PAPER)
+        layer.dot(robot_frame.at(0, 0), 2.6, colour)
 
 
-def _compute_light_radius(sensor: LightSensor, sight: _Viewport) -> float:
-    return sensor.diameter / 2 * sight.scale
+def _compute_light_radius(sensor: LightSensor, viewport: _Viewport) -> float:
+    return sensor.diameter / 2 * viewport.scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,8 +283,8 @@ class _RobotFrame:
         """Return a rectangle with round corners."""
         corners = ((right, front, 0), (left, front, 90), (left, back, 180), (right, back, 270))
         points = []
-        for x, y, begin in corners:
-            for angle in range(begin, begin + 91, 30):
+        for x, y, start_angle in corners:
+            for angle in range(start_angle, start_angle + 91, 30):
                 cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
                 inner_x = x - radius if x == right else x + radius
                 inner_y = y - radius if y == front else y + radius
@@ -274,12 +295,12 @@ class _RobotFrame:
 class _Layer:
     """A part of an image around some points, drawn enlarged and scaled down onto the image on exit."""
 
-    def __init__(self, image: Image.Image, points: list[Point], room: int = 8) -> None:
+    def __init__(self, image: Image.Image, points: list[Point], margin: int = 8) -> None:
         self._image = image
-        across, down = ([point[axis] for point in points] or [0.0] for axis in (0, 1))
-        self._left, self._top = max(0, math.floor(min(across)) - room), max(0, math.floor(min(down)) - room)
-        right = min(image.width, math.ceil(max(across)) + room)
-        bottom = min(image.height, math.ceil(max(down)) + room)
+        x_values, y_values = ([point[axis] for point in points] or [0.0] for axis in (0, 1))
+        self._left, self._top = max(0, math.floor(min(x_values)) - margin), max(0, math.floor(min(y_values)) - margin)
+        right = min(image.width, math.ceil(max(x_values)) + margin)
+        bottom = min(image.height, math.ceil(max(y_values)) + margin)
         self._size = max(0, right - self._left), max(0, bottom - self._top)
         self._layer = Image.new("RGBA", (self._size[0] * _OVERSAMPLING, self._size[1] * _OVERSAMPLING))
         self._draw = ImageDraw.Draw(self._layer)
@@ -289,32 +310,40 @@ class _Layer:
 
     def __exit__(self, *_: object) -> None:
         if 0 not in self._size:
-            small = self._layer.resize(self._size, Image.Resampling.BOX)
-            self._image.paste(small, (self._left, self._top), small)
+            reduced_layer = self._layer.resize(self._size, Image.Resampling.BOX)
+            self._image.paste(reduced_layer, (self._left, self._top), reduced_layer)
 
     def line(self, points: list[Point], colour: str, width: float) -> None:
-        fine = [self._enlarge(point) for point in points]
-        if len(set(fine)) > 1:
-            self._draw.line(fine, fill=colour, width=round(width * _OVERSAMPLING), joint="curve")
+        enlarged_points = [self._enlarge(point) for point in points]
+        if len(set(enlarged_points)) > 1:
+            self._draw.line(enlarged_points, fill=colour, width=round(width * _OVERSAMPLING), joint="curve")
 
-    def dashes(self, begin: Point, end: Point, colour: str, width: float) -> None:
-        long = math.dist(begin, end)
-        for start in np.arange(0, long, 10).tolist():
-            here, there = start / long, min(start + 6, long) / long
-            dash = [tuple(np.add(begin, np.multiply(np.subtract(end, begin), part)).tolist()) for part in (here, there)]
+    def dashes(self, start_point: Point, end_point: Point, colour: str, width: float) -> None:
+        length = math.dist(start_point, end_point)
+        for dash_start in np.arange(0, length, 10).tolist():
+            start_fraction, end_fraction = dash_start / length, min(dash_start + 6, length) / length
+            dash = [
+                tuple(np.add(start_point, np.multiply(np.subtract(end_point, start_point), part)).tolist())
+                for part in (start_fraction, end_fraction)
+            ]
             self._draw.line([self._enlarge((x, y)) for x, y in dash], fill=colour, width=round(width * _OVERSAMPLING))
 
     def polygon(self, points: list[Point], fill: str, outline: str | None = None, width: float = 1) -> None:
-        fine = [self._enlarge(point) for point in points]
-        self._draw.polygon(fine, fill=fill)
+        enlarged_points = [self._enlarge(point) for point in points]
+        self._draw.polygon(enlarged_points, fill=fill)
         if outline is not None:
-            self._draw.line([*fine, *fine[:2]], fill=outline, width=round(width * _OVERSAMPLING), joint="curve")
+            self._draw.line(
+                [*enlarged_points, *enlarged_points[:2]],
+                fill=outline,
+                width=round(width * _OVERSAMPLING),
+                joint="curve",
+            )
 
-    def dot(self, place: Point, radius: float, colour: str | tuple[int, ...]) -> None:
-        self._draw_circle(self._enlarge(place), radius * _OVERSAMPLING, colour)
+    def dot(self, centre: Point, radius: float, colour: str | tuple[int, ...]) -> None:
+        self._draw_circle(self._enlarge(centre), radius * _OVERSAMPLING, colour)
 
-    def _draw_circle(self, fine: Point, radius: float, colour: str | tuple[int, ...]) -> None:
-        x, y = fine
+    def _draw_circle(self, centre: Point, radius: float, colour: str | tuple[int, ...]) -> None:
+        x, y = centre
         self._draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour)
 
     def _enlarge(self, point: Point) -> Point:
@@ -325,8 +354,8 @@ class _Caption:
     """The text below the floor: the latest one, shown long enough to read."""
 
     def __init__(self, trial: TrialResult) -> None:
-        told = trial_to_json(trial, Sources())
-        texts = [*told["events"], *told["messages"]]
+        trial_data = trial_to_json(trial, Sources())
+        texts = [*trial_data["events"], *trial_data["messages"]]
         self._texts = sorted(texts, key=lambda text: float(text["t"]))
         self._moments = [float(text["t"]) for text in self._texts]
         self._count, self._since = 0, 0
@@ -344,11 +373,13 @@ class _Caption:
 def _format_caption(text: Mapping[str, Any]) -> tuple[str, str]:
     if "kind" in text:
         return f"{text['who']} {text['kind']}: {text['text']}", FAULT if text["kind"] in ("fault", "touched") else INK
-    befell = f"{text['befell']}: " if "befell" in text else ""
-    return f"{text['from']} → {text['to']}: {befell}{text['text']}", FAULT if text["arrived"] is None else LEFT
+    loss_text = f"{text['befell']}: " if "befell" in text else ""
+    return f"{text['from']} → {text['to']}: {loss_text}{text['text']}", FAULT if text["arrived"] is None else LEFT
 
 
-def _draw_caption_strip(frame: Image.Image, top: int, t: float, end: float, speed: int, words: tuple[str, str]) -> None:
+def _draw_caption_strip(
+    frame: Image.Image, top: int, t: float, end: float, speed: int, caption: tuple[str, str]
+) -> None:
     """Draw the progress as a bar and as a time, and the latest text."""
     draw = ImageDraw.Draw(frame)
     draw.rectangle((0, top, _WIDTH, top + 3), fill=RULE)
@@ -356,7 +387,7 @@ def _draw_caption_strip(frame: Image.Image, top: int, t: float, end: float, spee
     clock = f"{t:.1f} of {end:.1f} s"
     draw.text((8, top + 8), clock, fill=INK, font=_load_font())
     draw.text((_WIDTH - 8, top + 8), f"{speed}×", fill=FAINT, font=_load_font(), anchor="ra")
-    text, colour = words
+    text, colour = caption
     draw.text(
         (8, top + 28),
         _shorten_text(replace_missing_glyphs(to_one_line(text, 200)), _WIDTH - 16),
@@ -380,15 +411,17 @@ def _load_font() -> ImageFont.FreeTypeFont:
 
 def _build_palette(frames: Iterator[Image.Image]) -> Image.Image:
     """Return one palette for the whole film, from its first and last frame and all drawing colours."""
-    first, last = (frame.copy() for frame in frames)
-    sample = Image.new("RGB", (_WIDTH, first.height + last.height))
-    sample.paste(first)
-    sample.paste(last, (0, first.height))
+    first_frame, last_frame = (frame.copy() for frame in frames)
+    sample = Image.new("RGB", (_WIDTH, first_frame.height + last_frame.height))
+    sample.paste(first_frame)
+    sample.paste(last_frame, (0, first_frame.height))
     quantized = sample.quantize(_IMAGE_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    found = np.reshape(quantized.getpalette() or [], (-1, 3))[:_IMAGE_COLOURS]
-    exact = np.array([ImageColor.getrgb(colour) for colour in _COLOURS])
+    image_colours = np.reshape(quantized.getpalette() or [], (-1, 3))[:_IMAGE_COLOURS]
+    exact_colours = np.array([ImageColor.getrgb(colour) for colour in _COLOURS])
     # A pixel gets the first colour that is close, so similar colours would tint white areas.
-    others = found[np.abs(found[:, None] - exact).max(axis=2).min(axis=1) > _TOO_NEAR]
+    remaining_colours = image_colours[
+        np.abs(image_colours[:, None] - exact_colours).max(axis=2).min(axis=1) > _TOO_NEAR
+    ]
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.vstack((exact, others)).ravel().tolist())
+    palette.putpalette(np.vstack((exact_colours, remaining_colours)).ravel().tolist())
     return palette

@@ -78,10 +78,10 @@ class ShownImage:
 
 def render_floor_gallery(floors: Sequence[PrintedFloor]) -> str:
     """Return a page with every floor."""
-    shown = [
+    floor_data = [
         {"name": floor.name, "image": _to_data_uri(floor.image), "labels": ", ".join(floor.labels)} for floor in floors
     ]
-    return render_page("gallery.html", floors=shown)
+    return render_page("gallery.html", floors=floor_data)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def render_report_parts(
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
-    others: OverlayTrials = NO_OVERLAY,
+    overlay_trials: OverlayTrials = NO_OVERLAY,
 ) -> ReportParts:
     """Return one grade with its replay, and with the student's source if the submission is given.
 
@@ -113,20 +113,22 @@ def render_report_parts(
         plots: The result of ``draw_all_plots``. Missing plots are left out.
         submission: The submission, for its source.
         own_floors: Floors that are not built in, by name.
-        others: Trials to draw over those of the replay.
+        overlay_trials: Trials to draw over those of the replay.
     """
     images = {name: ShownImage(_to_data_uri(data), *_compute_display_size(data)) for name, data in plots.items()}
-    replay = build_grade_replay(view, submission, own_floors, REPORT_BYTES, others) if view.grade.trials else None
-    played = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
-    body = _create_environment(view.language).get_template("report_body.html")
-    told = body.render(
-        page=build_page(view, submission, played),
+    replay = (
+        build_grade_replay(view, submission, own_floors, REPORT_BYTES, overlay_trials) if view.grade.trials else None
+    )
+    replayed_trials = frozenset(trial["trial"] for trial in replay["trials"]) if replay else frozenset()
+    template = _create_environment(view.language).get_template("report_body.html")
+    report_html = template.render(
+        page=build_page(view, submission, replayed_trials),
         images=images,
         replay=_encode_replay(replay) if replay else "",
         words=translate_labels(view.language),
     )
     title = f"{view.grade.assignment_title}: {view.grade.student}"
-    return ReportParts(title, Markup(told), load_report_style(), load_report_script())
+    return ReportParts(title, Markup(report_html), load_report_style(), load_report_script())
 
 
 def preload_templates() -> None:
@@ -154,10 +156,10 @@ def render_report_page(
     plots: Mapping[str, bytes],
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
-    others: OverlayTrials = NO_OVERLAY,
+    overlay_trials: OverlayTrials = NO_OVERLAY,
 ) -> str:
     """Return the page of one grade, with all parts in one file."""
-    parts = render_report_parts(view, plots, submission, own_floors, others)
+    parts = render_report_parts(view, plots, submission, own_floors, overlay_trials)
     script = parts.script if view.grade.trials else ""
     return _render_secured_page(
         "report.html", parts.style, script, {"title": parts.title, "body": parts.body}, view.language
@@ -197,19 +199,19 @@ def render_replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) 
 
 def render_replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
     """Return a ``packed`` replay as a part of a page that has the style and script of reports."""
-    written = Markup(base64.b64encode(document).decode("ascii"))
-    return render_part("replay_section.html", language, replay=written, words=translate_labels(language))
+    encoded_replay = Markup(base64.b64encode(document).decode("ascii"))
+    return render_part("replay_section.html", language, replay=encoded_replay, words=translate_labels(language))
 
 
 def render_refusal_page(row: TableRow[Grade]) -> str:
     """Return the page of a rejected submission: what was found, what was expected, what to do next."""
-    found, _, expected = row.reason.partition(", expected ")
+    finding, _, expected = row.reason.partition(", expected ")
     return render_page(
         "refusal.html",
         who=row.student.name or row.who,
         source=row.source,
         assignment=row.assignment,
-        found=f"{found.rstrip('.')}.",
+        found=f"{finding.rstrip('.')}.",
         expected=f"{(expected or _EXPECTED_FORM).rstrip('.')}.",
     )
 
@@ -218,7 +220,7 @@ def render_batch_index(
     rows: Sequence[BatchRow], title: str = "Batch", sandbox: str = "", ranks: Sequence[RankTable] = ()
 ) -> str:
     """Return a page with one row per student (marks, verdict, link to the report), and the ranking tables."""
-    graded = [row for row in rows if row.marks is not None]
+    graded_rows = [row for row in rows if row.marks is not None]
     cells = [
         {
             "student": _add_line_breaks(row.student),
@@ -232,7 +234,7 @@ def render_batch_index(
         }
         for row in rows
     ]
-    return render_page("batch.html", title=title, rows=cells, graded=len(graded), sandbox=sandbox, ranks=ranks)
+    return render_page("batch.html", title=title, rows=cells, graded=len(graded_rows), sandbox=sandbox, ranks=ranks)
 
 
 def render_part(template: str, language: Language, **context: object) -> Markup:
@@ -297,8 +299,8 @@ def _to_data_uri(data: bytes) -> Markup:
 
 def _compute_display_size(image: bytes) -> tuple[int, int]:
     """Return the display size of a PNG from its header: 100 CSS pixels an inch, so 8 point type is 11 pixels high."""
-    across, down = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
-    return round(across * _CSS_PIXELS), round(down * _CSS_PIXELS)
+    width, height = (int.from_bytes(image[start : start + 4], "big") for start in (16, 20))
+    return round(width * _CSS_PIXELS), round(height * _CSS_PIXELS)
 
 
 def _add_line_breaks(name: str) -> Markup:

@@ -37,8 +37,8 @@ def describe_loss(message: Message, language: Language = ENGLISH) -> str:
     """Describe a message's loss or corruption in a few words; empty if it arrived once and unchanged."""
     note = describe_note(message.note, language)
     if message.arrived_as is not None:
-        words = language.say("corrupted to %(text)s", text=abbreviate_message(message.arrived_as, 40))
-        return f"{note}, {words}" if note else words
+        corruption = language.say("corrupted to %(text)s", text=abbreviate_message(message.arrived_as, 40))
+        return f"{note}, {corruption}" if note else corruption
     return language.say(_REASONS[message.lost]) if message.lost else note
 
 

@@ -36,31 +36,32 @@ def build_file_stem(student: str, assignment: str = "") -> str:
     A space becomes a dash, and a dash two. A name that loses more, or is too long, gets a hash. With ``assignment``,
     the stem is for the student's files of that assignment.
     """
-    plain = re.sub(r"[^\w.-]+", "-", student.replace("-", "--").replace(" ", "-"))
-    short = plain.encode()[:_MOST_BYTES].decode(errors="ignore").strip("-.")
-    again = re.sub("--?", lambda dashes: "-" if dashes[0] == "--" else " ", short)
-    if again != student or short.casefold() == "index":
-        short = f"{short or 'report'}~{hashlib.sha256(student.encode('utf-8', 'surrogatepass')).hexdigest()[:16]}"
-    return f"{short}+{assignment}" if assignment else short
+    safe_name = re.sub(r"[^\w.-]+", "-", student.replace("-", "--").replace(" ", "-"))
+    stem = safe_name.encode()[:_MOST_BYTES].decode(errors="ignore").strip("-.")
+    restored_name = re.sub("--?", lambda dashes: "-" if dashes[0] == "--" else " ", stem)
+    if restored_name != student or stem.casefold() == "index":
+        stem = f"{stem or 'report'}~{hashlib.sha256(student.encode('utf-8', 'surrogatepass')).hexdigest()[:16]}"
+    return f"{stem}+{assignment}" if assignment else stem
 
 
-def build_file_stems(graded: Sequence[tuple[str, str]]) -> list[str]:
+def build_file_stems(submissions: Sequence[tuple[str, str]]) -> list[str]:
     """Return a stem for each (student, assignment). It contains the assignment only if the student has several.
 
     Each pair may come once.
     """
-    many = Counter(student for student, _ in graded)
-    return [build_file_stem(student, assignment if many[student] > 1 else "") for student, assignment in graded]
+    counts = Counter(student for student, _ in submissions)
+    return [build_file_stem(student, assignment if counts[student] > 1 else "") for student, assignment in submissions]
 
 
-def build_refused_stems(refused: Sequence[tuple[str, str]]) -> list[str]:
+def build_refused_stems(rejections: Sequence[tuple[str, str]]) -> list[str]:
     """Return a stem for each (original name, student) that was rejected.
 
     One student may be rejected several times, and several students for one joint submission.
     """
-    many = Counter(source for source, _ in refused)
+    counts = Counter(source for source, _ in rejections)
     return [
-        build_file_stem(f"{source} {student}" if many[source] > 1 else source, "refused") for source, student in refused
+        build_file_stem(f"{source} {student}" if counts[source] > 1 else source, "refused")
+        for source, student in rejections
     ]
 
 
@@ -130,8 +131,8 @@ def write_file(folder: Path, name: str, data: bytes) -> Path:
     return path
 
 
-def write_report(folder: Path, grade: Grade, submission: Submission, written: str, language: Language) -> Path:
-    """Draw the plots of a grade and write the report, named after the student as ``written``. Return its path."""
+def write_report(folder: Path, grade: Grade, submission: Submission, student_name: str, language: Language) -> Path:
+    """Draw the plots of a grade and write the report, named after the student as ``student_name``. Return its path."""
     from service.reports.html import render_or_explain, render_report_page
     from service.reports.plots.grade_plots import draw_all_plots
     from service.reports.view import build_student_view
@@ -143,4 +144,4 @@ def write_report(folder: Path, grade: Grade, submission: Submission, written: st
         plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells)
         return render_report_page(view, plots, submission)
 
-    return write_page(folder, f"{build_file_stem(written)}.html", render_or_explain(view, render))
+    return write_page(folder, f"{build_file_stem(student_name)}.html", render_or_explain(view, render))

@@ -178,18 +178,18 @@ class Page:
     withheld: bool
 
 
-def build_page(view: View, submission: Submission | None = None, played: frozenset[int] = frozenset()) -> Page:
-    """Return the content of a report from a reader's view. ``played`` are the trials of its replay, from 1."""
+def build_page(view: View, submission: Submission | None = None, replayed_trials: frozenset[int] = frozenset()) -> Page:
+    """Return the content of a report from a reader's view. ``replayed_trials`` are the trials of its replay, from 1."""
     grade, language = view.grade, view.language
     plots = list_plots(grade, language)
-    lines = tuple(_build_trial_line(trial, language) for trial in grade.trials[:_MOST_TRIALS])
+    trial_lines = tuple(_build_trial_line(trial, language) for trial in grade.trials[:_MOST_TRIALS])
     faults = group_faults(grade, submission, language=language)
     diagnosis = diagnose(grade, submission, language)
     criteria = tuple(
-        _build_criterion_line(grade, result, played, language, told=index in diagnosis.lost)
+        _build_criterion_line(grade, result, replayed_trials, language, is_in_diagnosis=index in diagnosis.lost)
         for index, result in enumerate(grade.criteria)
     )
-    time_alone = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
+    is_time_limit_only = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
     return Page(
         grade=grade,
         marks=format_decimal(grade.marks),
@@ -204,7 +204,7 @@ def build_page(view: View, submission: Submission | None = None, played: frozens
         lost=tuple(line for index, line in enumerate(criteria) if index in diagnosis.lost),
         others=tuple(line for index, line in enumerate(criteria) if index not in diagnosis.lost),
         faults=faults,
-        faults_title=language.say("Result") if time_alone else language.say("Errors"),
+        faults_title=language.say("Result") if is_time_limit_only else language.say("Errors"),
         recognition=tuple(
             _build_recognition_section(grade, alike, plots, language) for alike in group_same_answers(grade)
         ),
@@ -212,8 +212,8 @@ def build_page(view: View, submission: Submission | None = None, played: frozens
         diagrams=()
         if submission is None
         else list_own_diagrams(grade, read_diagrams(submission.notebook).cells, language),
-        trials=lines,
-        more_trials=len(grade.trials) - len(lines),
+        trials=trial_lines,
+        more_trials=len(grade.trials) - len(trial_lines),
         notes=tuple(to_display_text(note, 400) for note in grade.notes[:20]),
         channel=describe_channel_losses(grade, language),
         cost=describe_cost(grade, language),
@@ -226,12 +226,12 @@ def build_page(view: View, submission: Submission | None = None, played: frozens
 def build_timeline(recording: Recording, language: Language = ENGLISH) -> tuple[TimelineEntry, ...]:
     """Return prints, speech, touches and faults by time. If there are too many, the middle is left out."""
     moments: list[tuple[float, str, str]] = []
-    for robot, own in iterate_robots(recording):
-        whose = "" if own is recording else f"{format_party_name(robot, language)}: "
-        moments += [(line.t, "printed", whose + line.text) for line in collect_printed_lines(own)]
-        moments += [(line.t, "said", whose + line.text) for line in own.spoken]
-        moments += [(touch.t, "touched", whose + touch.what) for touch in own.touches]
-        moments += [(fault.t, _classify_fault(fault), whose + fault.message) for fault in own.faults]
+    for robot, robot_recording in iterate_robots(recording):
+        prefix = "" if robot_recording is recording else f"{format_party_name(robot, language)}: "
+        moments += [(line.t, "printed", prefix + line.text) for line in collect_printed_lines(robot_recording)]
+        moments += [(line.t, "said", prefix + line.text) for line in robot_recording.spoken]
+        moments += [(touch.t, "touched", prefix + touch.what) for touch in robot_recording.touches]
+        moments += [(fault.t, _classify_fault(fault), prefix + fault.message) for fault in robot_recording.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
     entries = [_build_entry(t, kind, text, language) for t, kind, text in moments]
@@ -247,25 +247,35 @@ def _classify_fault(fault: Fault) -> str:
 
 
 def _build_criterion_line(
-    grade: Grade, result: CriterionResult, played: frozenset[int], language: Language, *, told: bool
+    grade: Grade, result: CriterionResult, replayed_trials: frozenset[int], language: Language, *, is_in_diagnosis: bool
 ) -> CriterionLine:
-    full = result.marks >= result.max_marks
-    missed = [item for item in result.evidence if not item.passed]
-    failed = next(iter(missed), None)
-    watched = next((item for item in missed if item.trial + 1 in played), None) if not full else None
-    seconds = compute_loss_time(grade.trials[watched.trial].recording, watched.t) if watched is not None else 0.0
+    has_full_marks = result.marks >= result.max_marks
+    failures = [item for item in result.evidence if not item.passed]
+    first_failure = next(iter(failures), None)
+    watched_failure = (
+        next((item for item in failures if item.trial + 1 in replayed_trials), None) if not has_full_marks else None
+    )
+    seconds = (
+        compute_loss_time(grade.trials[watched_failure.trial].recording, watched_failure.t)
+        if watched_failure is not None
+        else 0.0
+    )
     return CriterionLine(
         title=to_one_line(result.title, 200),
-        told="" if told or (full and result.set_by_hand is None) else describe_finding(grade, result, language),
+        told=""
+        if is_in_diagnosis or (has_full_marks and result.set_by_hand is None)
+        else describe_finding(grade, result, language),
         message=to_display_text(result.message, 1000, lines=12),
         marks=format_decimal(result.marks),
         max_marks=format_decimal(result.max_marks),
         share=_compute_share(float(result.marks), float(result.max_marks)) if result.max_marks else 100.0,
         state="excused" if result.excused else _classify_marks(result.marks, result.max_marks),
         visibility=result.visibility,
-        where="" if full or failed is None else _describe_first_failure(grade, failed, language),
-        moment="" if watched is None else format_moment_link(watched.trial + 1, seconds),
-        watch="" if watched is None else _format_watch_label(grade, watched.trial, seconds, language),
+        where=""
+        if has_full_marks or first_failure is None
+        else _describe_first_failure(grade, first_failure, language),
+        moment="" if watched_failure is None else format_moment_link(watched_failure.trial + 1, seconds),
+        watch="" if watched_failure is None else _format_watch_label(grade, watched_failure.trial, seconds, language),
         for_staff=to_display_text(result.for_staff, 1000, lines=4),
     )
 
@@ -291,9 +301,9 @@ def _build_scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language:
     trial = grade.trials[index]
     recording = trial.recording
     lines = tuple(_build_message_lines(recording, language))
-    several = len(grade.trials) > 1
+    has_several_trials = len(grade.trials) > 1
     return Scene(
-        where=f": {format_trial_name(trial, language, 80)}" if several else "",
+        where=f": {format_trial_name(trial, language, 80)}" if has_several_trials else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=build_timeline(recording, language),
         messages=lines[:_MOST_MESSAGES],
@@ -311,23 +321,23 @@ def _collect_outputs(recording: Recording, language: Language) -> Iterator[TextO
     say = language.say
     yield TextOutput(say("Output of your responder"), to_display_text(recording.responder_output, 4000))
     yield TextOutput(say("Log file of your responder (logger.txt)"), to_display_text(recording.responder_log, 4000))
-    for each in recording.agent_outputs:
-        yield TextOutput(say("Output of the agent %(name)s", name=each.agent), to_display_text(each.printed, 4000))
+    for output in recording.agent_outputs:
+        yield TextOutput(say("Output of the agent %(name)s", name=output.agent), to_display_text(output.printed, 4000))
         yield TextOutput(
-            say("Log file of the agent %(name)s (logger.txt)", name=each.agent), to_display_text(each.log, 4000)
+            say("Log file of the agent %(name)s (logger.txt)", name=output.agent), to_display_text(output.log, 4000)
         )
 
 
 def _build_recognition_section(
-    grade: Grade, alike: tuple[int, ...], plots: tuple[Plot, ...], language: Language
+    grade: Grade, criterion_indices: tuple[int, ...], plots: tuple[Plot, ...], language: Language
 ) -> RecognitionSection:
-    results = [grade.criteria[index] for index in alike]
+    results = [grade.criteria[index] for index in criterion_indices]
     tables = tuple(build_recognition_table(result, language) for result in results if result.accuracy is not None)
     return RecognitionSection(
         language.say(" and ").join(f"“{to_one_line(result.title, 80)}”" for result in results),
         tables,
         tables[0].classes if tables else (),
-        tuple(plot for plot in plots if not plot.scenario and plot.subject in alike),
+        tuple(plot for plot in plots if not plot.scenario and plot.subject in criterion_indices),
     )
 
 
@@ -338,13 +348,13 @@ def _build_message_lines(recording: Recording, language: Language) -> Iterator[M
     """
     yield from (_build_inner_line(step, language) for step in iterate_inner_steps(recording, -1))
     for index, (sender, message) in enumerate(collect_messages(recording, language)):
-        lost = message.delivered is None
+        is_lost = message.delivered is None
         arrived = language.say("never") if message.delivered is None else f"{message.delivered:.2f} s"
-        happened = describe_loss_fully(message, language)
-        if happened:
-            arrived += f" ({happened})"
-        kind = "wrong" if lost or happened else ""
-        yield MessageLine(f"{message.t:.2f}", sender, abbreviate_message(message.text, 240), arrived, kind, lost)
+        loss_text = describe_loss_fully(message, language)
+        if loss_text:
+            arrived += f" ({loss_text})"
+        kind = "wrong" if is_lost or loss_text else ""
+        yield MessageLine(f"{message.t:.2f}", sender, abbreviate_message(message.text, 240), arrived, kind, is_lost)
         if recording.partner is None:
             steps = itertools.islice(iterate_inner_steps(recording, index), MOST_CALL_STEPS)
             yield from (_build_inner_line(step, language) for step in steps)
@@ -352,9 +362,9 @@ def _build_message_lines(recording: Recording, language: Language) -> Iterator[M
 
 def _build_inner_line(step: Step, language: Language) -> MessageLine:
     t = "" if step.t is None else f"{step.t:.2f}"
-    way = f"{format_party_name(step.source, language)} → {format_party_name(step.target, language)}"
+    direction = f"{format_party_name(step.source, language)} → {format_party_name(step.target, language)}"
     note = f"({describe_note(step.note, language)})" if step.note else ""
-    return MessageLine(t, way, step.label, note, "wrong" if step.note else "inner")
+    return MessageLine(t, direction, step.label, note, "wrong" if step.note else "inner")
 
 
 def _build_trial_line(trial: TrialResult, language: Language) -> TrialLine:
@@ -374,13 +384,15 @@ def _build_trial_line(trial: TrialResult, language: Language) -> TrialLine:
 
 def _describe_channel_settings(trial: TrialResult, language: Language) -> str:
     """Return the swept channel settings in words. Offsets and noise have separate columns."""
-    words = {"loss": language.say("loss"), "delay": language.say("delay")}
-    return "".join(f"; {words[condition]} {level:g}" for condition, level in trial.sweep if condition in words)
+    condition_names = {"loss": language.say("loss"), "delay": language.say("delay")}
+    return "".join(
+        f"; {condition_names[condition]} {level:g}" for condition, level in trial.sweep if condition in condition_names
+    )
 
 
 def _build_entry(t: float, kind: str, text: str, language: Language) -> TimelineEntry:
     return TimelineEntry(f"{t:.2f}", kind, language.say(EVENT_KINDS[kind]), to_display_text(text, 400, lines=8))
 
 
-def _compute_share(part: float, whole: float) -> float:
-    return round(100 * max(0.0, min(1.0, part / whole)), 1) if whole else 0.0
+def _compute_share(amount: float, total: float) -> float:
+    return round(100 * max(0.0, min(1.0, amount / total)), 1) if total else 0.0

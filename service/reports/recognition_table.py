@@ -72,7 +72,7 @@ def _describe_counts(accuracy: Accuracy, language: Language) -> str:
     counts = accuracy.counts
     if counts is None:
         return ""
-    sent = language.say(
+    sent_text = language.say(
         "Images sent: %(sent)s = %(answered)s answered + %(late)s late + %(malformed)s malformed + "
         "%(unanswered)s unanswered; duplicate answers: %(duplicates)s.",
         sent=counts.sent,
@@ -82,27 +82,31 @@ def _describe_counts(accuracy: Accuracy, language: Language) -> str:
         unanswered=counts.unanswered,
         duplicates=counts.duplicates,
     )
-    of = count_correct(accuracy, language)[1]
-    counted = language.say("Counted: %(counted)s %(of)s.", counted=counts.counted, of=of)
+    unit = count_correct(accuracy, language)[1]
+    counted_text = language.say("Counted: %(counted)s %(of)s.", counted=counts.counted, of=unit)
     if counts.missing:
-        counted = language.say(
+        counted_text = language.say(
             "Counted: %(counted)s %(of)s, and %(missing)s that were missing, each a wrong answer.",
             counted=counts.counted,
-            of=of,
+            of=unit,
             missing=counts.missing,
         )
-    return f"{sent} {counted}"
+    return f"{sent_text} {counted_text}"
 
 
 def _describe_confidence(accuracy: Accuracy, language: Language) -> str:
-    found = accuracy.confidence
-    if found is None:
+    confidence = accuracy.confidence
+    if confidence is None:
         return ""
     means = []
-    if found.right is not None:
-        means.append(language.say("%(mean)s when correct (n = %(n)s)", mean=f"{found.right:.2f}", n=found.n_right))
-    if found.wrong is not None:
-        means.append(language.say("%(mean)s when wrong (n = %(n)s)", mean=f"{found.wrong:.2f}", n=found.n_wrong))
+    if confidence.right is not None:
+        means.append(
+            language.say("%(mean)s when correct (n = %(n)s)", mean=f"{confidence.right:.2f}", n=confidence.n_right)
+        )
+    if confidence.wrong is not None:
+        means.append(
+            language.say("%(mean)s when wrong (n = %(n)s)", mean=f"{confidence.wrong:.2f}", n=confidence.n_wrong)
+        )
     return language.say("Mean confidence %(means)s.", means=language.say(" and ").join(means))
 
 

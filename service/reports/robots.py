@@ -56,12 +56,15 @@ def iterate_robots(recording: Recording) -> Iterator[tuple[str, Recording]]:
 
 def collect_messages(recording: Recording, language: Language = ENGLISH) -> list[tuple[str, Message]]:
     """Return every message with its sender, in order of sending."""
-    said = []
-    for name, own in iterate_robots(recording):
-        robot, responder = format_party_name(name, language), format_party_name(select_answering_party(own), language)
-        if own is not recording and not has_no_responder(own):
+    messages = []
+    for name, robot_recording in iterate_robots(recording):
+        robot, responder = (
+            format_party_name(name, language),
+            format_party_name(select_answering_party(robot_recording), language),
+        )
+        if robot_recording is not recording and not has_no_responder(robot_recording):
             responder = language.say("responder to %(robot)s", robot=robot)
-        for message in own.messages:
+        for message in robot_recording.messages:
             if message.sender != "partner":  # the other robot's list has it
-                said.append((robot if message.sender == "robot" else responder, message))
-    return said if recording.partner is None else sorted(said, key=lambda each: each[1].t)
+                messages.append((robot if message.sender == "robot" else responder, message))
+    return messages if recording.partner is None else sorted(messages, key=lambda each: each[1].t)

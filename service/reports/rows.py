@@ -21,7 +21,8 @@ class TableRow(Generic[_V]):
     """One submission. ``grade`` is the visible grade, or None; ``reason`` says why there is none.
 
     A grade also has a reason if a part was not submitted. ``refused`` marks a rejected submission, which will not get a
-    grade. ``told`` is the reason for the student, if it differs. A row that is ``for_staff`` is not shown to students.
+    grade. ``student_reason`` is the reason for the student, if it differs. A row that is ``for_staff`` is not shown to
+    students.
     """
 
     student: Student

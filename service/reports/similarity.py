@@ -32,40 +32,40 @@ SourceReader = Callable[[str, str, str], str]
 _MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
 
 
-def describe_similarity(found: Similarity, language: Language = ENGLISH) -> str:
+def describe_similarity(similarity: Similarity, language: Language = ENGLISH) -> str:
     """Return a sentence on an assignment: the number of pairs, and what could not be compared."""
-    parts: dict[str, object] = {"assignment": found.assignment, "students": found.students}
-    groups = len({*found.same, *found.same_recordings})
-    said = language.say("%(assignment)s: no similar pairs among %(students)s students", **parts)
+    parts: dict[str, object] = {"assignment": similarity.assignment, "students": similarity.students}
+    groups = len({*similarity.same, *similarity.same_recordings})
+    sentence = language.say("%(assignment)s: no similar pairs among %(students)s students", **parts)
     if groups:
-        said = language.counted(
+        sentence = language.counted(
             "%(assignment)s: %(count)s group with a common file or common recordings among %(students)s students",
             "%(assignment)s: %(count)s groups with a common file or common recordings among %(students)s students",
             groups,
             **parts,
         )
-    if found.pairs:
-        said = language.counted(
+    if similarity.pairs:
+        sentence = language.counted(
             "%(assignment)s: %(count)s similar pair among %(students)s students",
             "%(assignment)s: %(count)s similar pairs among %(students)s students",
-            len(found.pairs),
+            len(similarity.pairs),
             **parts,
         )
-    if found.too_short:
-        said += "; " + language.counted(
+    if similarity.too_short:
+        sentence += "; " + language.counted(
             "%(count)s student has too little code to compare (fewer than %(tokens)s tokens), so only the recordings "
             "are compared",
             "%(count)s students have too little code to compare (fewer than %(tokens)s tokens), so only the "
             "recordings are compared",
-            len(found.too_short),
+            len(similarity.too_short),
             tokens=FEWEST_TOKENS,
         )
-    if found.not_compared:
-        said += "; " + language.say("%(count)s less similar pairs were not compared", count=found.not_compared)
-    return said
+    if similarity.not_compared:
+        sentence += "; " + language.say("%(count)s less similar pairs were not compared", count=similarity.not_compared)
+    return sentence
 
 
-def build_similarity_rows(found: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
+def build_similarity_rows(similarity: Similarity, language: Language = ENGLISH) -> list[tuple[str, ...]]:
     """Return rows with both students, the similar fraction of a source, its place, and the trials in common."""
     return [
         (
@@ -74,7 +74,7 @@ def build_similarity_rows(found: Similarity, language: Language = ENGLISH) -> li
             _format_files(pair, language),
             _format_trial_count(pair, language),
         )
-        for pair in found.pairs
+        for pair in similarity.pairs
     ]
 
 
@@ -86,30 +86,30 @@ def similarity_to_json(view: SimilarityView) -> list[dict[str, Any]]:
     ]
 
 
-def render_similarity_page(view: SimilarityView, texts: SourceReader, title: str, most: int) -> str:
-    """Return a page with the first ``most`` pairs of each assignment."""
-    return render_page("similarity.html", title=title, assignments=_build_assignments(view, texts, most), links={})
+def render_similarity_page(view: SimilarityView, texts: SourceReader, title: str, max_pairs: int) -> str:
+    """Return a page with the first ``max_pairs`` pairs of each assignment."""
+    return render_page("similarity.html", title=title, assignments=_build_assignments(view, texts, max_pairs), links={})
 
 
 def render_similarity_body(
-    view: SimilarityView, texts: SourceReader, most: int, links: Mapping[tuple[str, str], str]
+    view: SimilarityView, texts: SourceReader, max_pairs: int, links: Mapping[tuple[str, str], str]
 ) -> Markup:
     """Return the findings as a part of another page, with ``links`` by assignment and student."""
     return render_part(
-        "similarity_body.html", view.language, assignments=_build_assignments(view, texts, most), links=links
+        "similarity_body.html", view.language, assignments=_build_assignments(view, texts, max_pairs), links=links
     )
 
 
-def _build_assignments(view: SimilarityView, texts: SourceReader, most: int) -> list[dict[str, object]]:
+def _build_assignments(view: SimilarityView, texts: SourceReader, max_pairs: int) -> list[dict[str, object]]:
     return [
         {
             "name": found.assignment,
             "words": describe_similarity(found, view.language),
             "same": found.same,
             "same_recordings": found.same_recordings,
-            "rows": build_similarity_rows(found, view.language)[:most],
-            "more": len(found.pairs) - most,
-            "pairs": [_build_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:most]],
+            "rows": build_similarity_rows(found, view.language)[:max_pairs],
+            "more": len(found.pairs) - max_pairs,
+            "pairs": [_build_pair(found.assignment, pair, texts, view.language) for pair in found.pairs[:max_pairs]],
         }
         for found in view.found
     ]
@@ -132,11 +132,14 @@ def _build_pair(assignment: str, pair: SimilarPair, texts: SourceReader, languag
     }
 
 
-def _build_source(assignment: str, alike: SimilarSources, texts: SourceReader, language: Language) -> dict[str, object]:
-    both = [
-        texts(assignment, student, file).split("\n") for student, file in zip(alike.students, alike.files, strict=True)
+def _build_source(
+    assignment: str, similar_sources: SimilarSources, texts: SourceReader, language: Language
+) -> dict[str, object]:
+    line_lists = [
+        texts(assignment, student, file).split("\n")
+        for student, file in zip(similar_sources.students, similar_sources.files, strict=True)
     ]
-    heads = [
+    headings = [
         language.say(
             "%(student)s: %(file)s, %(share)s of %(tokens)s tokens",
             student=student,
@@ -144,29 +147,37 @@ def _build_source(assignment: str, alike: SimilarSources, texts: SourceReader, l
             share=f"{share:.0%}",
             tokens=own,
         )
-        for student, file, share, own in zip(alike.students, alike.files, alike.shares, alike.own_tokens, strict=True)
+        for student, file, share, own in zip(
+            similar_sources.students,
+            similar_sources.files,
+            similar_sources.shares,
+            similar_sources.own_tokens,
+            strict=True,
+        )
     ]
-    in_order = sorted(alike.stretches[:_MOST_STRETCHES], key=lambda stretch: stretch.lines)
+    sorted_stretches = sorted(similar_sources.stretches[:_MOST_STRETCHES], key=lambda stretch: stretch.lines)
     return {
-        "heads": heads,
-        "stretches": [list(_align_lines(stretch, *both)) for stretch in in_order],
-        "more": len(alike.stretches) - _MOST_STRETCHES,
+        "heads": headings,
+        "stretches": [list(_align_lines(stretch, *line_lists)) for stretch in sorted_stretches],
+        "more": len(similar_sources.stretches) - _MOST_STRETCHES,
     }
 
 
-def _align_lines(stretch: Stretch, one: Sequence[str], other: Sequence[str]) -> Iterator[tuple[str, str, str, str]]:
-    sides = (_number_lines(one, stretch.lines), _number_lines(other, stretch.other_lines))
+def _align_lines(
+    stretch: Stretch, first_lines: Sequence[str], second_lines: Sequence[str]
+) -> Iterator[tuple[str, str, str, str]]:
+    sides = (_number_lines(first_lines, stretch.lines), _number_lines(second_lines, stretch.other_lines))
     for left, right in zip_longest(*sides, fillvalue=("", "")):
         yield *left, *right
 
 
 def _number_lines(lines: Sequence[str], span: tuple[int, int]) -> list[tuple[str, str]]:
-    first, last = span
-    shown = [
+    first_number, last_number = span
+    numbered_lines = [
         (str(number), "    " * _measure_indentation(text) + to_one_line(text, _MOST_OF_LINE))
-        for number, text in enumerate(lines[first - 1 : last][:_MOST_LINES], first)
+        for number, text in enumerate(lines[first_number - 1 : last_number][:_MOST_LINES], first_number)
     ]
-    return shown if last - first < _MOST_LINES else [*shown, ("", "…")]
+    return numbered_lines if last_number - first_number < _MOST_LINES else [*numbered_lines, ("", "…")]
 
 
 def _measure_indentation(line: str) -> int:
@@ -175,8 +186,15 @@ def _measure_indentation(line: str) -> int:
     return (len(start) - len(start.lstrip())) // 4
 
 
-def _format_trial(same: SharedBehaviour, language: Language) -> tuple[str, ...]:
+def _format_trial(shared_behaviour: SharedBehaviour, language: Language) -> tuple[str, ...]:
     say = language.say
-    chance = say("with noise") if same.trial.noisy else say("without noise")
-    sharing = say("%(sharing)s of %(students)s", sharing=same.sharing, students=same.students)
-    return f"{same.trial.scenario} {same.trial.index + 1}", chance, say(_ASPECTS[same.aspect]), sharing
+    noise_text = say("with noise") if shared_behaviour.trial.noisy else say("without noise")
+    sharing_text = say(
+        "%(sharing)s of %(students)s", sharing=shared_behaviour.sharing, students=shared_behaviour.students
+    )
+    return (
+        f"{shared_behaviour.trial.scenario} {shared_behaviour.trial.index + 1}",
+        noise_text,
+        say(_ASPECTS[shared_behaviour.aspect]),
+        sharing_text,
+    )

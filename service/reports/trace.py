@@ -64,7 +64,7 @@ def build_trace(recording: Recording) -> dict[str, Any]:
 
 def agent_messages_to_json(recording: Recording) -> dict[str, Any]:
     """Return the messages between the responder and its agents, under their key; empty if there are none."""
-    told = [
+    messages = [
         {
             "t": _to_finite(each.t),
             "sender": each.sender,
@@ -76,7 +76,7 @@ def agent_messages_to_json(recording: Recording) -> dict[str, Any]:
         }
         for each in recording.agent_messages
     ]
-    return {"agent_messages": told} if told else {}
+    return {"agent_messages": messages} if messages else {}
 
 
 def replace_surrogates(text: str) -> str:

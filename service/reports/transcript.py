@@ -15,17 +15,22 @@ _ANSWER_LABELS: Mapping[str, str] = MappingProxyType({"responder": "answer", SIM
 
 def build_transcript(recording: Recording) -> list[tuple[float, str]]:
     """Return the simulated second and the line of each text, from all robots."""
-    shown: list[tuple[float, int, str]] = []
-    for which, own in iterate_robots(recording):
-        whose = "" if own is recording else f"{which}: "
-        shown += [(line.t, 0, whose + line.text) for line in collect_printed_lines(own)]
-        shown += [(line.t, 1, f"{whose}(says) {line.text}") for line in own.spoken]
-        lost = [message for message in own.messages if message.lost and message.sender != "partner"]
-        shown += [(message.t, 2, f"{whose}(lost) {message.text}: {describe_loss_fully(message)}") for message in lost]
-        arrived = {"responder": _ANSWER_LABELS[select_answering_party(own)], "partner": "heard"}
-        shown += [
-            (message.delivered, 2, f"{whose}({arrived[message.sender]}) {message.received}")
-            for message in own.messages
-            if message.sender in arrived and message.delivered is not None
+    entries: list[tuple[float, int, str]] = []
+    for robot, robot_recording in iterate_robots(recording):
+        prefix = "" if robot_recording is recording else f"{robot}: "
+        entries += [(line.t, 0, prefix + line.text) for line in collect_printed_lines(robot_recording)]
+        entries += [(line.t, 1, f"{prefix}(says) {line.text}") for line in robot_recording.spoken]
+        lost_messages = [
+            message for message in robot_recording.messages if message.lost and message.sender != "partner"
         ]
-    return [(t, text) for t, _, text in sorted(shown, key=lambda each: (each[0], each[1]))]
+        entries += [
+            (message.t, 2, f"{prefix}(lost) {message.text}: {describe_loss_fully(message)}")
+            for message in lost_messages
+        ]
+        arrival_labels = {"responder": _ANSWER_LABELS[select_answering_party(robot_recording)], "partner": "heard"}
+        entries += [
+            (message.delivered, 2, f"{prefix}({arrival_labels[message.sender]}) {message.received}")
+            for message in robot_recording.messages
+            if message.sender in arrival_labels and message.delivered is not None
+        ]
+    return [(t, text) for t, _, text in sorted(entries, key=lambda each: (each[0], each[1]))]

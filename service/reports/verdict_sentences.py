@@ -159,9 +159,15 @@ def describe_verdict(verdict: Verdict, language: Language = ENGLISH) -> VerdictW
     return _translate_words(_WORDS[verdict], language)
 
 
-def _translate_words(words: VerdictWords, language: Language) -> VerdictWords:
+def _translate_words(verdict_words: VerdictWords, language: Language) -> VerdictWords:
     say = language.say
-    return VerdictWords(say(words.short), say(words.happened), say(words.whose), say(words.next_step), words.tone)
+    return VerdictWords(
+        say(verdict_words.short),
+        say(verdict_words.happened),
+        say(verdict_words.whose),
+        say(verdict_words.next_step),
+        verdict_words.tone,
+    )
 
 
 #: No robot was run: functions were called and the source was checked.
@@ -206,50 +212,56 @@ _AGENT_ERROR = VerdictWords(
 
 def describe_grade(grade: Grade, language: Language = ENGLISH) -> VerdictWords:
     """Return the words for a grade's verdict, or for a missing part or run, with the next step."""
-    words = _describe_outcome(grade, language)
-    return replace(words, next_step=_describe_next_step(grade, words, language))
+    verdict_words = _describe_outcome(grade, language)
+    return replace(verdict_words, next_step=_describe_next_step(grade, verdict_words, language))
 
 
-def _describe_next_step(grade: Grade, words: VerdictWords, language: Language) -> str:
+def _describe_next_step(grade: Grade, verdict_words: VerdictWords, language: Language) -> str:
     """Return the verdict's advice if there was a problem, otherwise where most marks can be gained."""
-    if words.tone == "bad" or is_not_students_fault(grade.verdict):
-        return words.next_step
-    lost = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
-    if lost is None:
-        return words.next_step
-    if lost.marks >= lost.max_marks:
+    if verdict_words.tone == "bad" or is_not_students_fault(grade.verdict):
+        return verdict_words.next_step
+    costliest_criterion = max(grade.criteria, key=lambda result: result.max_marks - result.marks, default=None)
+    if costliest_criterion is None:
+        return verdict_words.next_step
+    if costliest_criterion.marks >= costliest_criterion.max_marks:
         return language.say(FULL_MARKS)
-    most = language.say(
+    suggestion = language.say(
         "The most marks are available for “%(criterion)s”: %(missing)s of %(of)s.",
-        criterion=to_one_line(lost.title, 100),
-        missing=format_decimal(lost.max_marks - lost.marks),
-        of=format_decimal(lost.max_marks),
+        criterion=to_one_line(costliest_criterion.title, 100),
+        missing=format_decimal(costliest_criterion.max_marks - costliest_criterion.marks),
+        of=format_decimal(costliest_criterion.max_marks),
     )
     advice = (
-        words.next_step
+        verdict_words.next_step
         if _is_verdict_advice_relevant(grade)
         else _translate_words(_WORDS[Verdict.FINISHED], language).next_step
     )
-    return f"{most} {advice}"
+    return f"{suggestion} {advice}"
 
 
 def _is_verdict_advice_relevant(grade: Grade) -> bool:
     """Return whether the verdict's advice applies: a time limit counts only if a criterion names it."""
     if grade.missing or grade.verdict is not Verdict.TIME_LIMIT:
         return True
-    told = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
+    failure_messages = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
     faults = (fault for trial in grade.trials for fault in collect_faults(trial.recording))
-    return any(fault.verdict is Verdict.TIME_LIMIT and fault.message in each for fault in faults for each in told)
+    return any(
+        fault.verdict is Verdict.TIME_LIMIT and fault.message in each for fault in faults for each in failure_messages
+    )
 
 
 def _describe_outcome(grade: Grade, language: Language) -> VerdictWords:
     if not grade.missing:
         return _translate_words(_select_verdict_words(grade) if grade.trials else _NO_ROBOT, language)
-    words = _translate_words(_MISSING_PART[grade.missing], language)
+    missing_words = _translate_words(_MISSING_PART[grade.missing], language)
     if grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
-        return words
-    ended = _translate_words(_select_verdict_words(grade), language)
-    return replace(ended, short=f"{ended.short}; {words.short}", happened=f"{words.happened} {ended.happened}")
+        return missing_words
+    ending_words = _translate_words(_select_verdict_words(grade), language)
+    return replace(
+        ending_words,
+        short=f"{ending_words.short}; {missing_words.short}",
+        happened=f"{missing_words.happened} {ending_words.happened}",
+    )
 
 
 def _select_verdict_words(grade: Grade) -> VerdictWords:
@@ -275,18 +287,18 @@ EVENT_KINDS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def format_trial_name(trial: TrialResult, language: Language = ENGLISH, longest: int = 60) -> str:
+def format_trial_name(trial: TrialResult, language: Language = ENGLISH, max_length: int = 60) -> str:
     """Return the name of a trial: its scenario and its number."""
-    scenario = to_one_line(trial.scenario, longest)
+    scenario = to_one_line(trial.scenario, max_length)
     return language.say("%(scenario)s, trial %(number)s", scenario=scenario, number=trial.index + 1)
 
 
 def format_hints(grade: Grade) -> tuple[str, ...]:
     """Return the likely causes of lost marks as sentences that are safe to show, before anything else."""
-    told = (to_display_text(hint, 600).rstrip(".") for hint in grade.hints)
+    hint_texts = (to_display_text(hint, 600).rstrip(".") for hint in grade.hints)
     # A file name keeps its case.
-    began = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in told)
-    return tuple(hint if hint.endswith("?") else f"{hint}." for hint in began)
+    capitalised_hints = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in hint_texts)
+    return tuple(hint if hint.endswith("?") else f"{hint}." for hint in capitalised_hints)
 
 
 def is_not_students_fault(verdict: Verdict) -> bool:
@@ -296,38 +308,40 @@ def is_not_students_fault(verdict: Verdict) -> bool:
 
 def count_correct(accuracy: Accuracy, language: Language = ENGLISH) -> tuple[int, str]:
     """Return how many were identified correctly, and the unit."""
-    of = accuracy.counts.of if accuracy.counts else "images"
-    return round(accuracy.value * accuracy.n), language.say(_UNITS.get(of, "%(of)s"), of=of)
+    unit = accuracy.counts.of if accuracy.counts else "images"
+    return round(accuracy.value * accuracy.n), language.say(_UNITS.get(unit, "%(of)s"), of=unit)
 
 
 def describe_adjustment(result: CriterionResult, language: Language = ENGLISH) -> str:
     """Return a sentence on a staff adjustment and its reason; empty if there is none."""
-    said = result.set_by_hand
-    if said is None:
+    adjustment = result.set_by_hand
+    if adjustment is None:
         return ""
-    reason = to_one_line(said.reason, 500)
+    reason = to_one_line(adjustment.reason, 500)
     reason += "" if reason.endswith((".", "!", "?", "…")) else "."
     marks = format_decimal(result.marks)
-    if said.excused and said.graded is None:
+    if adjustment.excused and adjustment.graded is None:
         return language.say("Excused, does not count: %(reason)s", reason=reason)
-    if said.graded is None:
+    if adjustment.graded is None:
         return language.say("Adjusted by staff to %(marks)s: %(reason)s", marks=marks, reason=reason)
-    had = format_decimal(said.graded)
-    if said.excused:
+    graded_marks = format_decimal(adjustment.graded)
+    if adjustment.excused:
         return language.say(
             "Excused, does not count (before: %(had)s of %(worth)s): %(reason)s",
-            had=had,
-            worth=format_decimal(said.worth),
+            had=graded_marks,
+            worth=format_decimal(adjustment.worth),
             reason=reason,
         )
-    return language.say("Adjusted by staff from %(had)s to %(marks)s: %(reason)s", had=had, marks=marks, reason=reason)
+    return language.say(
+        "Adjusted by staff from %(had)s to %(marks)s: %(reason)s", had=graded_marks, marks=marks, reason=reason
+    )
 
 
 def format_comments(grade: Grade) -> tuple[str, ...]:
     """Return the instructors' comments with their criterion, for display beside the marks."""
     titles = {result.id: to_one_line(result.title, 200) for result in grade.criteria}
-    about = ((titles.get(each.criterion, ""), to_display_text(each.text, 2000)) for each in grade.comments)
-    return tuple(f"{title}: {text}" if title else text for title, text in about)
+    titled_comments = ((titles.get(each.criterion, ""), to_display_text(each.text, 2000)) for each in grade.comments)
+    return tuple(f"{title}: {text}" if title else text for title, text in titled_comments)
 
 
 def describe_accuracy(grade: Grade) -> str:
@@ -345,18 +359,20 @@ def describe_accuracy(grade: Grade) -> str:
 def describe_channel_losses(grade: Grade, language: Language = ENGLISH) -> str:
     """Return one or two sentences on the channel's losses in all trials, and the reasons; empty without losses."""
     messages = [message for trial in grade.trials for message in trial.recording.messages]
-    lost: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
-    if not lost:
+    loss_counts: Counter[LossReason] = Counter(message.lost for message in messages if message.lost)
+    if not loss_counts:
         return ""
-    reasons = ", ".join(f"{lost[reason]} {language.say(words)}" for reason, words in _LOSSES.items() if lost[reason])
-    told = language.say(
+    reasons = ", ".join(
+        f"{loss_counts[reason]} {language.say(words)}" for reason, words in _LOSSES.items() if loss_counts[reason]
+    )
+    summary = language.say(
         "The channel lost %(lost)s of %(sent)s messages: %(reasons)s.",
-        lost=lost.total(),
+        lost=loss_counts.total(),
         sent=len(messages),
         reasons=reasons,
     )
-    fair = language.say("Messages lost by chance do not cost marks.")
-    return f"{told} {fair}" if lost["chance"] else told
+    fairness_note = language.say("Messages lost by chance do not cost marks.")
+    return f"{summary} {fairness_note}" if loss_counts["chance"] else summary
 
 
 def describe_cost(grade: Grade, language: Language = ENGLISH) -> str:
@@ -364,7 +380,7 @@ def describe_cost(grade: Grade, language: Language = ENGLISH) -> str:
     if grade.cost is None or grade.cost.spent is None:
         return ""
     limits, spent = grade.cost.limits, grade.cost.spent
-    most = {
+    limit_texts = {
         "most_cpu": f"{limits.cpu_seconds:g}",
         "most_sleep": f"{limits.sleep_seconds:g}",
         "most_output": limits.kept_bytes >> 20,
@@ -375,5 +391,5 @@ def describe_cost(grade: Grade, language: Language = ENGLISH) -> str:
         cpu=f"{round(spent.cpu_seconds, 1):g}",
         sleep=f"{round(spent.sleep_seconds, 1):g}",
         output=f"{round(spent.kept_bytes / _MEGABYTE, 1):g}",
-        **most,
+        **limit_texts,
     )

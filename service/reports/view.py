@@ -78,15 +78,15 @@ class SimilarityView:
 NO_OVERLAY = OverlayTrials("", MappingProxyType({}))
 
 
-def build_similarity_view(found: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
+def build_similarity_view(similarities: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
     """Return everything."""
-    return SimilarityView(tuple(found), language)
+    return SimilarityView(tuple(similarities), language)
 
 
 def build_staff_view(grade: Grade, language: Language = ENGLISH) -> View:
     """Return everything."""
-    told = tuple(_add_adjustment(result, language) for result in grade.criteria)
-    return View(replace(grade, criteria=told), staff=True, withheld=False, language=language)
+    criteria = tuple(_add_adjustment(result, language) for result in grade.criteria)
+    return View(replace(grade, criteria=criteria), staff=True, withheld=False, language=language)
 
 
 def build_student_view(
@@ -100,34 +100,34 @@ def build_student_view(
     are those of the visible trials. So only the marks depend on hidden trials. Totals are those of the visible
     criteria.
     """
-    kept = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
-    new_index = {old: new for new, old in enumerate(kept)}
-    shown = {result.id for result in grade.criteria if result.visibility in released}
-    left = replace(
+    trial_indices = [index for index, trial in enumerate(grade.trials) if trial.visibility in released]
+    new_index = {old: new for new, old in enumerate(trial_indices)}
+    visible_ids = {result.id for result in grade.criteria if result.visibility in released}
+    visible_grade = replace(
         grade,
         criteria=tuple(
             _add_adjustment(replace(_remove_hidden_trials(result, new_index), for_staff="", unjudged=""), language)
             for result in grade.criteria
-            if result.id in shown
+            if result.id in visible_ids
         ),
-        trials=tuple(grade.trials[index] for index in kept),
-        notes=_select_notes(grade, shown),
+        trials=tuple(grade.trials[index] for index in trial_indices),
+        notes=_select_notes(grade, visible_ids),
         cost=None,  # the CPU limit depends on the number of trials, including hidden ones
-        comments=tuple(each for each in grade.comments if shown and each.criterion in ("", *shown)),
+        comments=tuple(each for each in grade.comments if visible_ids and each.criterion in ("", *visible_ids)),
     )
-    withheld = len(left.criteria) < len(grade.criteria) or len(left.trials) < len(grade.trials)
-    return View(left, staff=False, withheld=withheld, language=language)
+    withheld = len(visible_grade.criteria) < len(grade.criteria) or len(visible_grade.trials) < len(grade.trials)
+    return View(visible_grade, staff=False, withheld=withheld, language=language)
 
 
-def _select_notes(grade: Grade, shown: Set[str]) -> tuple[str, ...]:
+def _select_notes(grade: Grade, visible_ids: Set[str]) -> tuple[str, ...]:
     """Return the notes on a grade. The note on unjudged criteria counts only visible ones."""
-    seen = [result for result in grade.criteria if result.id in shown]
+    visible_criteria = [result for result in grade.criteria if result.id in visible_ids]
     notes = [note for note in grade.notes if note not in build_unjudged_notes(grade.criteria)]
-    return (*notes, *build_unjudged_notes(seen))
+    return (*notes, *build_unjudged_notes(visible_criteria))
 
 
-def select_overlay_trials(view: View, other: Grade, name: str, released: frozenset[str]) -> OverlayTrials:
-    """Return the trials of ``other`` with the same settings as those of the view, as far as the reader may see them.
+def select_overlay_trials(view: View, other_grade: Grade, name: str, released: frozenset[str]) -> OverlayTrials:
+    """Return the trials of ``other_grade`` with the same settings as those of the view, if the reader may see them.
 
     Staff see all. Students see their own. They also see the reference solution's once the grade that they read is
     published; the student of the reference is named like that example. Both are limited to visibilities in
@@ -137,16 +137,18 @@ def select_overlay_trials(view: View, other: Grade, name: str, released: frozens
         UsageError: Nothing is left.
     """
     if view.staff:
-        seen = other.trials
-    elif other.student == view.grade.student or (other.student == REFERENCE and "after_published" in released):
-        seen = build_student_view(other, released).grade.trials
-    elif other.student == REFERENCE:
+        visible_trials = other_grade.trials
+    elif other_grade.student == view.grade.student or (
+        other_grade.student == REFERENCE and "after_published" in released
+    ):
+        visible_trials = build_student_view(other_grade, released).grade.trials
+    elif other_grade.student == REFERENCE:
         raise UsageError("the reference is shown over a student's trials once the grade is published, not before")
     else:
         raise UsageError("this is another student's grade; expected one of the same student, or the reference's")
-    same = other.assignment == view.grade.assignment
-    run_as = {_collect_settings(trial): trial for trial in seen} if same else {}
-    pairs = ((index, run_as.get(_collect_settings(trial))) for index, trial in enumerate(view.grade.trials))
+    is_same_assignment = other_grade.assignment == view.grade.assignment
+    trials_by_settings = {_collect_settings(trial): trial for trial in visible_trials} if is_same_assignment else {}
+    pairs = ((index, trials_by_settings.get(_collect_settings(trial))) for index, trial in enumerate(view.grade.trials))
     trials = {index: trial for index, trial in pairs if trial is not None}
     if not trials:
         raise UsageError(
@@ -157,8 +159,8 @@ def select_overlay_trials(view: View, other: Grade, name: str, released: frozens
 
 def build_gradebook_view(grade: Grade) -> GradebookView:
     """Return all marks with their visibilities, which the gradebook applies itself."""
-    told = tuple(_limit_text(grade, result) for result in grade.criteria)
-    return GradebookView(replace(grade, criteria=told, trials=()), build_student_view(grade).grade)
+    criteria = tuple(_limit_text(grade, result) for result in grade.criteria)
+    return GradebookView(replace(grade, criteria=criteria, trials=()), build_student_view(grade).grade)
 
 
 def is_for_staff(visibility: str) -> bool:
@@ -181,13 +183,13 @@ def find_worst_trial(grade: Grade, scenario: str) -> int:
     A trial loses the marks of every criterion it failed. Among equals, a fault is worse than a time limit, and a time
     limit is worse than finishing.
     """
-    lost = [Decimal(0)] * len(grade.trials)
+    lost_marks = [Decimal(0)] * len(grade.trials)
     for result in grade.criteria:
         for evidence in result.evidence:
-            if not evidence.passed and 0 <= evidence.trial < len(lost):
-                lost[evidence.trial] += result.worth
+            if not evidence.passed and 0 <= evidence.trial < len(lost_marks):
+                lost_marks[evidence.trial] += result.worth
     candidates = [index for index, trial in enumerate(grade.trials) if trial.scenario == scenario]
-    return max(candidates, key=lambda index: (lost[index], _rank_severity(grade.trials[index]), -index))
+    return max(candidates, key=lambda index: (lost_marks[index], _rank_severity(grade.trials[index]), -index))
 
 
 def list_scenarios(grade: Grade) -> tuple[str, ...]:
@@ -210,8 +212,8 @@ def _limit_text(grade: Grade, result: CriterionResult) -> CriterionResult:
 
 
 def _add_adjustment(result: CriterionResult, language: Language) -> CriterionResult:
-    words = describe_adjustment(result, language)
-    return replace(result, message=" ".join(filter(None, (words, result.message)))) if words else result
+    sentence = describe_adjustment(result, language)
+    return replace(result, message=" ".join(filter(None, (sentence, result.message)))) if sentence else result
 
 
 def _rank_severity(trial: TrialResult) -> int:
@@ -227,9 +229,15 @@ def _remove_hidden_trials(result: CriterionResult, new_index: dict[int, int]) ->
         for prediction in result.predictions
         if prediction.trial in new_index
     )
-    kept = replace(result, evidence=evidence, predictions=predictions)
+    visible_result = replace(result, evidence=evidence, predictions=predictions)
     if len(evidence) == len(result.evidence):
-        return replace(kept, shown=None)
+        return replace(visible_result, shown=None)
     # Older grades without a separate visible part show nothing.
-    shown = result.shown or VisibleFeedback(add_hidden_note(""))
-    return replace(kept, message=shown.message, accuracy=shown.accuracy, curves=shown.curves, shown=None)
+    visible_feedback = result.shown or VisibleFeedback(add_hidden_note(""))
+    return replace(
+        visible_result,
+        message=visible_feedback.message,
+        accuracy=visible_feedback.accuracy,
+        curves=visible_feedback.curves,
+        shown=None,
+    )

@@ -69,18 +69,20 @@ class Behaviour:
 def extract_behaviour(trials: Iterable[TrialResult]) -> Behaviour:
     """Return the data to compare of a student's trials, without those that the machine cut short."""
     trials = list(trials)
-    compared = [trial for trial in trials if trial.verdict not in _CUT_SHORT_VERDICTS]
+    compared_trials = [trial for trial in trials if trial.verdict not in _CUT_SHORT_VERDICTS]
     aspects = {
         (_build_trial_name(trial), aspect): digest
-        for trial in compared
+        for trial in compared_trials
         for aspect, digest in _digest_aspects(trial.recording)
     }
-    did_something = any(aspect != "faults" for _, aspect in aspects)
-    whole = did_something and len(compared) == len(trials)
+    has_actions = any(aspect != "faults" for _, aspect in aspects)
+    is_complete = has_actions and len(compared_trials) == len(trials)
     return Behaviour(
         aspects,
-        frozenset(_build_trial_name(trial) for trial in compared if _count_turns(trial.recording) >= WINDING_TURNS),
-        _compute_digest(_encode_trial(trial) for trial in trials) if whole else "",
+        frozenset(
+            _build_trial_name(trial) for trial in compared_trials if _count_turns(trial.recording) >= WINDING_TURNS
+        ),
+        _compute_digest(_encode_trial(trial) for trial in trials) if is_complete else "",
     )
 
 
@@ -103,15 +105,15 @@ def find_shared_behaviour(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str
         for (trial, aspect), digest in behaviours[student].aspects.items():
             sharing[trial, aspect][digest].append(student)
             active[trial].add(student)
-    found: dict[tuple[str, str], list[SharedBehaviour]] = defaultdict(list)
+    shared_behaviour: dict[tuple[str, str], list[SharedBehaviour]] = defaultdict(list)
     for (trial, aspect), groups in sorted(sharing.items(), key=lambda item: (item[0][0].scenario, item[0][0].index)):
         students = len(active[trial])
-        most = max(2, RARE_FRACTION * students)
+        max_students = max(2, RARE_FRACTION * students)
         for group in groups.values():
-            if students >= FEWEST_STUDENTS and 2 <= len(group) <= most:
+            if students >= FEWEST_STUDENTS and 2 <= len(group) <= max_students:
                 for pair in combinations(group, 2):
-                    found[pair].append(SharedBehaviour(trial, aspect, len(group), students))
-    return {pair: tuple(same) for pair, same in found.items()}
+                    shared_behaviour[pair].append(SharedBehaviour(trial, aspect, len(group), students))
+    return {pair: tuple(same) for pair, same in shared_behaviour.items()}
 
 
 def _build_trial_name(trial: TrialResult) -> TrialName:
@@ -123,7 +125,7 @@ def _digest_aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
     if any(_has_moved(robot) for robot in robots):
         columns = [column for robot in robots for column in (robot.ticks.x, robot.ticks.y, robot.ticks.heading)]
         yield "path", _compute_digest(column.tobytes() for column in columns)
-    said = [
+    texts = [
         f"{who}\n{text}"
         for robot in robots
         for who, text in (
@@ -132,8 +134,8 @@ def _digest_aspects(recording: Recording) -> Iterable[tuple[Aspect, str]]:
             *(("spoken", line.text) for line in robot.spoken),
         )
     ]
-    if said:
-        yield "messages", _compute_digest(text.encode("utf-8", "surrogatepass") for text in said)
+    if texts:
+        yield "messages", _compute_digest(text.encode("utf-8", "surrogatepass") for text in texts)
     faults = [f"{fault.t} {fault.verdict} {fault.who} {fault.message}" for fault in _filter_faults(recording)]
     if faults:
         yield "faults", _compute_digest(fault.encode("utf-8", "surrogatepass") for fault in faults)
@@ -145,9 +147,9 @@ def _encode_trial(trial: TrialResult) -> bytes:
 
 def _count_turns(recording: Recording) -> int:
     """Return how often the robot changed between turning left and turning right."""
-    turning = np.sign(np.diff(recording.ticks.heading).round(3))
-    turning = turning[turning != 0]
-    return int(np.count_nonzero(turning[1:] != turning[:-1]))
+    directions = np.sign(np.diff(recording.ticks.heading).round(3))
+    directions = directions[directions != 0]
+    return int(np.count_nonzero(directions[1:] != directions[:-1]))
 
 
 def _has_moved(recording: Recording) -> bool:
@@ -161,8 +163,8 @@ def _filter_faults(recording: Recording) -> list[Fault]:
 
 
 def _compute_digest(pieces: Iterable[bytes]) -> str:
-    made = hashlib.sha256()
+    digest = hashlib.sha256()
     for piece in pieces:
-        made.update(b"%d\n" % len(piece))
-        made.update(piece)
-    return made.hexdigest()
+        digest.update(b"%d\n" % len(piece))
+        digest.update(piece)
+    return digest.hexdigest()

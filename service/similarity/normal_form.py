@@ -62,16 +62,16 @@ def _group_brackets(statement: Sequence[Word]) -> list[_Item] | None:
     items: list[_Item] = []
     open_groups: list[_Group] = []
     for word in statement:
-        inside = open_groups[-1].items if open_groups else items
+        inner_items = open_groups[-1].items if open_groups else items
         if word.text in _CLOSING:
             open_groups.append(_Group(word))
-            inside.append(open_groups[-1])
+            inner_items.append(open_groups[-1])
         elif open_groups and word.text == _CLOSING[open_groups[-1].opening.text]:
             open_groups.pop().closing = word
         elif word.text in _CLOSING.values():
             return None
         else:
-            inside.append(word)
+            inner_items.append(word)
         if len(open_groups) > _DEEPEST_NESTING:
             return None
     return None if open_groups else items
@@ -125,31 +125,31 @@ def _ends_operand(items: Sequence[_Item]) -> bool:
 
 
 def _join_operands(operands: Sequence[tuple[Word | None, list[_Item]]], may_swap: bool) -> list[Word]:
-    written = [(operator, _normalise_expression(items)) for operator, items in operands]
-    first = next(operator for operator, _ in written if operator is not None)
+    normalised_operands = [(operator, _normalise_expression(items)) for operator, items in operands]
+    first_operator = next(operator for operator, _ in normalised_operands if operator is not None)
     # The order of concatenated texts matters.
-    if not may_swap or any(words and words[0].text == "text" for _, words in written):
+    if not may_swap or any(words and words[0].text == "text" for _, words in normalised_operands):
         return (
-            _normalise_comparison(written)
-            if len(written) == 2
-            else [word for each in written for word in _prepend_operator(*each)]
+            _normalise_comparison(normalised_operands)
+            if len(normalised_operands) == 2
+            else [word for each in normalised_operands for word in _prepend_operator(*each)]
         )
-    unwritten = Word(_IMPLICIT_OPERATORS.get(first.text, first.text), first.line)
-    pairs = [(operator or unwritten, words) for operator, words in written]
+    implicit_operator = Word(_IMPLICIT_OPERATORS.get(first_operator.text, first_operator.text), first_operator.line)
+    pairs = [(operator or implicit_operator, words) for operator, words in normalised_operands]
     pairs.sort(key=lambda pair: (pair[0].text, [word.text for word in pair[1]]))
-    (operator, words), *rest = pairs
+    (operator, words), *other_pairs = pairs
     sign = [operator] if operator.text == "-" else []
-    return [*sign, *words, *(word for each in rest for word in _prepend_operator(*each))]
+    return [*sign, *words, *(word for each in other_pairs for word in _prepend_operator(*each))]
 
 
-def _normalise_comparison(written: Sequence[tuple[Word | None, list[Word]]]) -> list[Word]:
-    (_, one), (operator, other) = written
+def _normalise_comparison(operands: Sequence[tuple[Word | None, list[Word]]]) -> list[Word]:
+    (_, first_words), (operator, second_words) = operands
     assert operator is not None
-    swaps = operator.text in _FLIPPED or (
-        operator.text in ("==", "!=") and [word.text for word in other] < [word.text for word in one]
+    is_swapped = operator.text in _FLIPPED or (
+        operator.text in ("==", "!=") and [word.text for word in second_words] < [word.text for word in first_words]
     )
     operator = Word(_FLIPPED.get(operator.text, operator.text), operator.line)
-    return [*other, operator, *one] if swaps else [*one, operator, *other]
+    return [*second_words, operator, *first_words] if is_swapped else [*first_words, operator, *second_words]
 
 
 def _prepend_operator(operator: Word | None, words: Sequence[Word]) -> list[Word]:
@@ -158,32 +158,32 @@ def _prepend_operator(operator: Word | None, words: Sequence[Word]) -> list[Word
 
 def _normalise_atoms(items: Sequence[_Item]) -> Iterator[Word]:
     """Yield names, calls, subscripts and brackets, without brackets that only group."""
-    before: _Item | None = None
-    for place, item in enumerate(items):
+    last_item: _Item | None = None
+    for index, item in enumerate(items):
         if isinstance(item, Word):
-            if not (item.text == "sum" and _extract_summands(items[place + 1 : place + 2])):
+            if not (item.text == "sum" and _extract_summands(items[index + 1 : index + 2])):
                 yield item
-        elif isinstance(before, Word) and before.text == "sum" and (summands := _extract_summands([item])):
+        elif isinstance(last_item, Word) and last_item.text == "sum" and (summands := _extract_summands([item])):
             yield from _normalise_expression(summands)
-        elif item.opening.text == "(" and item.items and not _is_callee(before):
+        elif item.opening.text == "(" and item.items and not _is_callee(last_item):
             yield from _normalise_segments(item.items)
-        elif not (_is_callee(before) and _is_pair_index(item)):
+        elif not (_is_callee(last_item) and _is_pair_index(item)):
             yield item.opening
             yield from _normalise_segments(item.items)
             if item.closing is not None:
                 yield item.closing
-        before = item
+        last_item = item
 
 
-def _is_callee(before: _Item | None) -> bool:
+def _is_callee(item: _Item | None) -> bool:
     """Return whether brackets after this item are those of a call or a subscript."""
-    return isinstance(before, _Group) or (before is not None and before.text.isidentifier())
+    return isinstance(item, _Group) or (item is not None and item.text.isidentifier())
 
 
 def _is_pair_index(group: _Group) -> bool:
     """Return whether it is ``[0]``: a place of a pair counts like a variable."""
-    inside = [item.text for item in group.items if isinstance(item, Word)]
-    return group.opening.text == "[" and len(group.items) == 1 and inside == ["number"]
+    inner_texts = [item.text for item in group.items if isinstance(item, Word)]
+    return group.opening.text == "[" and len(group.items) == 1 and inner_texts == ["number"]
 
 
 def _extract_summands(items: Sequence[_Item]) -> list[_Item]:

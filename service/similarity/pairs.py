@@ -44,32 +44,37 @@ class Similarity:
 
 
 def compare_submissions(
-    assignment: str, sources: Sequence[Source], given: Sequence[str], behaviours: Mapping[str, Behaviour]
+    assignment: str, sources: Sequence[Source], given_code: Sequence[str], behaviours: Mapping[str, Behaviour]
 ) -> Similarity:
     """Return all similar pairs among these students' submissions."""
-    writing = compare_sources(sources, given)
-    alike: dict[tuple[str, str], list[SimilarSources]] = {}
-    for each in writing.alike:
-        alike.setdefault(each.students, []).append(each)
-    same = find_shared_behaviour(behaviours)
-    often = {
-        pair for pair, found in same.items() if _has_enough_trials(found, [behaviours[student] for student in pair])
+    comparison = compare_sources(sources, given_code)
+    similar_sources: dict[tuple[str, str], list[SimilarSources]] = {}
+    for source_pair in comparison.alike:
+        similar_sources.setdefault(source_pair.students, []).append(source_pair)
+    shared_behaviour = find_shared_behaviour(behaviours)
+    behaviour_pairs = {
+        pair
+        for pair, found in shared_behaviour.items()
+        if _has_enough_trials(found, [behaviours[student] for student in pair])
     }
-    pairs = [SimilarPair(pair, tuple(alike.get(pair, ())), same.get(pair, ())) for pair in {*alike, *often}]
+    pairs = [
+        SimilarPair(pair, tuple(similar_sources.get(pair, ())), shared_behaviour.get(pair, ()))
+        for pair in {*similar_sources, *behaviour_pairs}
+    ]
     pairs.sort(key=lambda pair: (-pair.share, -len(pair.trials), pair.students))
     students = {source.student for source in sources} | set(behaviours)
     return Similarity(
         assignment,
         len(students),
         tuple(pairs),
-        writing.too_short,
-        writing.not_compared,
-        writing.same,
+        comparison.too_short,
+        comparison.not_compared,
+        comparison.same,
         group_same_recordings(behaviours),
     )
 
 
-def _has_enough_trials(same: Sequence[SharedBehaviour], behaviours: Sequence[Behaviour]) -> bool:
-    paths = [each.trial for each in same if each.aspect == "path"]
+def _has_enough_trials(shared_behaviour: Sequence[SharedBehaviour], behaviours: Sequence[Behaviour]) -> bool:
+    paths = [each.trial for each in shared_behaviour if each.aspect == "path"]
     weight = sum(2 if trial in behaviours[0].winding else 1 for trial in paths)
     return weight >= FEWEST_TRIALS and len(paths) >= SAME_PART * max(each.trials for each in behaviours)

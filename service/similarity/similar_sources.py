@@ -105,29 +105,32 @@ def build_source(student: str, file: str, text: str) -> Source:
 
 
 def compare_sources(
-    sources: Sequence[Source], given: Sequence[str], alike: float = SIMILARITY_THRESHOLD
+    sources: Sequence[Source], given_code: Sequence[str], cutoff: float = SIMILARITY_THRESHOLD
 ) -> SourceComparison:
     """Return all pairs of different students' sources that are similar.
 
-    In a similar pair, the fraction ``alike`` of one source's own tokens is also in the other. The students of a pair
+    In a similar pair, the fraction ``cutoff`` of one source's own tokens is also in the other. The students of a pair
     are in order of name.
     """
     sources = sorted(sources, key=lambda source: source.student)
     all_grams = [compute_grams(source.tokens) for source in sources]
-    all_given = _compute_given_grams(given)
-    left_out = np.union1d(all_given, _find_common_grams(sources, all_grams))
-    indexed = [_index_source(source, own, left_out) for source, own in zip(sources, all_grams, strict=True)]
-    long_enough = [each for each in indexed if each.own >= FEWEST_TOKENS]
-    candidates = list(_find_candidates(long_enough, alike))
-    chosen = nlargest(MOST_PAIRS, candidates, key=lambda candidate: candidate[0])
-    compared = (_compare_pair(one, other) for _, one, other in chosen)
-    found = sorted(
-        (each for each in compared if each.share >= alike), key=lambda each: (-each.share, each.students, each.files)
+    given_grams = _compute_given_grams(given_code)
+    excluded_grams = np.union1d(given_grams, _find_common_grams(sources, all_grams))
+    indexed_sources = [
+        _index_source(source, own, excluded_grams) for source, own in zip(sources, all_grams, strict=True)
+    ]
+    long_sources = [each for each in indexed_sources if each.own >= FEWEST_TOKENS]
+    candidates = list(_find_candidates(long_sources, cutoff))
+    chosen_pairs = nlargest(MOST_PAIRS, candidates, key=lambda candidate: candidate[0])
+    compared_pairs = (_compare_pair(one, other) for _, one, other in chosen_pairs)
+    similar_pairs = sorted(
+        (each for each in compared_pairs if each.share >= cutoff),
+        key=lambda each: (-each.share, each.students, each.files),
     )
-    same = _group_same_files(sources, all_grams, all_given)
-    heard = {each.source.student for each in long_enough}.union(*same)
-    too_short = sorted({source.student for source in sources} - heard)
-    return SourceComparison(tuple(found), tuple(too_short), len(candidates) - len(chosen), same)
+    same_files = _group_same_files(sources, all_grams, given_grams)
+    compared_students = {each.source.student for each in long_sources}.union(*same_files)
+    too_short = sorted({source.student for source in sources} - compared_students)
+    return SourceComparison(tuple(similar_pairs), tuple(too_short), len(candidates) - len(chosen_pairs), same_files)
 
 
 def _compute_given_grams(texts: Sequence[str]) -> NDArray[np.uint64]:
@@ -135,97 +138,111 @@ def _compute_given_grams(texts: Sequence[str]) -> NDArray[np.uint64]:
 
 
 def _group_same_files(
-    sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given: NDArray[np.uint64]
+    sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]], given_grams: NDArray[np.uint64]
 ) -> tuple[tuple[str, ...], ...]:
     """Return groups that share a whole file with enough code that was not given.
 
     Files that nearly all students have are left out, because they must have been given in some other way.
     """
     students: dict[bytes, set[str]] = {}
-    for source, own in zip(sources, all_grams, strict=True):
+    for source, grams in zip(sources, all_grams, strict=True):
         size = len(source.tokens)
-        if size - int(mark_covered_tokens(np.isin(own, given), size).sum()) >= FEWEST_TOKENS:
-            students.setdefault(own.tobytes(), set()).add(source.student)
-    most = max(FEWEST_IN_COMMON, NEARLY_ALL * len({source.student for source in sources}))
-    groups = {tuple(sorted(group)) for group in students.values() if 1 < len(group) <= most}
+        if size - int(mark_covered_tokens(np.isin(grams, given_grams), size).sum()) >= FEWEST_TOKENS:
+            students.setdefault(grams.tobytes(), set()).add(source.student)
+    max_students = max(FEWEST_IN_COMMON, NEARLY_ALL * len({source.student for source in sources}))
+    groups = {tuple(sorted(group)) for group in students.values() if 1 < len(group) <= max_students}
     return tuple(sorted(groups, key=lambda group: (-len(group), group)))
 
 
 def _find_common_grams(sources: Sequence[Source], all_grams: Sequence[NDArray[np.uint64]]) -> NDArray[np.uint64]:
-    of_students: dict[str, list[NDArray[np.uint64]]] = {}
-    for source, own in zip(sources, all_grams, strict=True):
-        of_students.setdefault(source.student, []).append(own)
-    once_each = [np.unique(np.concatenate(own)) for own in of_students.values()]
-    found, counts = np.unique(np.concatenate([np.empty(0, np.uint64), *once_each]), return_counts=True)
-    return found[counts >= max(FEWEST_IN_COMMON, COMMON_PART * len(of_students))]
+    student_grams: dict[str, list[NDArray[np.uint64]]] = {}
+    for source, grams in zip(sources, all_grams, strict=True):
+        student_grams.setdefault(source.student, []).append(grams)
+    unique_grams = [np.unique(np.concatenate(own)) for own in student_grams.values()]
+    all_unique, counts = np.unique(np.concatenate([np.empty(0, np.uint64), *unique_grams]), return_counts=True)
+    return all_unique[counts >= max(FEWEST_IN_COMMON, COMMON_PART * len(student_grams))]
 
 
-def _index_source(source: Source, own: NDArray[np.uint64], left_out: NDArray[np.uint64]) -> _IndexedSource:
-    masked, telling = np.isin(own, left_out), mark_varied_grams(source.tokens)
-    is_own, size = telling & ~masked, len(source.tokens)
-    places = select_fingerprints(own)
-    fingerprints = np.unique(own[places[is_own[places]]])
+def _index_source(source: Source, grams: NDArray[np.uint64], excluded_grams: NDArray[np.uint64]) -> _IndexedSource:
+    is_excluded, is_varied = np.isin(grams, excluded_grams), mark_varied_grams(source.tokens)
+    is_own, size = is_varied & ~is_excluded, len(source.tokens)
+    places = select_fingerprints(grams)
+    fingerprints = np.unique(grams[places[is_own[places]]])
     return _IndexedSource(
-        source, own, is_own, mark_covered_tokens(telling, size) & ~mark_covered_tokens(masked, size), fingerprints
+        source,
+        grams,
+        is_own,
+        mark_covered_tokens(is_varied, size) & ~mark_covered_tokens(is_excluded, size),
+        fingerprints,
     )
 
 
 def _find_candidates(
-    indexed: Sequence[_IndexedSource], alike: float
+    indexed_sources: Sequence[_IndexedSource], cutoff: float
 ) -> Iterator[tuple[float, _IndexedSource, _IndexedSource]]:
     """Yield pairs with enough common fingerprints to be similar, and the common fraction."""
-    if not indexed:
+    if not indexed_sources:
         return
-    numbers = np.concatenate([each.fingerprints for each in indexed])
-    owners = np.repeat(np.arange(len(indexed)), [len(each.fingerprints) for each in indexed])
+    numbers = np.concatenate([each.fingerprints for each in indexed_sources])
+    owners = np.repeat(np.arange(len(indexed_sources)), [len(each.fingerprints) for each in indexed_sources])
     order = np.argsort(numbers, kind="stable")
     numbers, owners = numbers[order], owners[order]
-    for place, one in enumerate(indexed):
-        begins = np.searchsorted(numbers, one.fingerprints, "left")
-        ends = np.searchsorted(numbers, one.fingerprints, "right")
-        who = [owners[begin:end] for begin, end in zip(begins, ends, strict=True) if end - begin > 1]
-        shared = np.bincount(np.concatenate([np.empty(0, np.int64), *who]), minlength=len(indexed))
-        for number in (np.flatnonzero(shared[place + 1 :]) + place + 1).tolist():
-            other = indexed[number]
-            part = shared[number] / min(len(one.fingerprints), len(other.fingerprints))
+    for index, first_source in enumerate(indexed_sources):
+        starts = np.searchsorted(numbers, first_source.fingerprints, "left")
+        ends = np.searchsorted(numbers, first_source.fingerprints, "right")
+        sharing_owners = [owners[begin:end] for begin, end in zip(starts, ends, strict=True) if end - begin > 1]
+        shared_counts = np.bincount(
+            np.concatenate([np.empty(0, np.int64), *sharing_owners]), minlength=len(indexed_sources)
+        )
+        for number in (np.flatnonzero(shared_counts[index + 1 :]) + index + 1).tolist():
+            second_source = indexed_sources[number]
+            share = shared_counts[number] / min(len(first_source.fingerprints), len(second_source.fingerprints))
             # Half of the threshold, because fingerprints are a sample.
-            if part >= alike / 2 and one.source.student != other.source.student:
-                yield float(part), one, other
+            if share >= cutoff / 2 and first_source.source.student != second_source.source.student:
+                yield float(share), first_source, second_source
 
 
-def _compare_pair(one: _IndexedSource, other: _IndexedSource) -> SimilarSources:
-    like = np.isin(one.grams, other.grams[other.is_own]) & one.is_own
-    other_like = np.isin(other.grams, one.grams[one.is_own]) & other.is_own
-    shares = (_compute_share(one, like), _compute_share(other, other_like))
+def _compare_pair(first_source: _IndexedSource, second_source: _IndexedSource) -> SimilarSources:
+    is_shared = np.isin(first_source.grams, second_source.grams[second_source.is_own]) & first_source.is_own
+    is_shared_by_first = np.isin(second_source.grams, first_source.grams[first_source.is_own]) & second_source.is_own
+    shares = (_compute_share(first_source, is_shared), _compute_share(second_source, is_shared_by_first))
     return SimilarSources(
-        (one.source.student, other.source.student),
-        (one.source.file, other.source.file),
+        (first_source.source.student, second_source.source.student),
+        (first_source.source.file, second_source.source.file),
         shares,
-        (one.own, other.own),
-        _find_stretches(one, other, like),
+        (first_source.own, second_source.own),
+        _find_stretches(first_source, second_source, is_shared),
     )
 
 
-def _compute_share(one: _IndexedSource, like: NDArray[np.bool_]) -> float:
-    return float((mark_covered_tokens(like, len(one.source.tokens)) & one.own_tokens).sum() / one.own)
+def _compute_share(indexed_source: _IndexedSource, is_shared: NDArray[np.bool_]) -> float:
+    return float(
+        (mark_covered_tokens(is_shared, len(indexed_source.source.tokens)) & indexed_source.own_tokens).sum()
+        / indexed_source.own
+    )
 
 
-def _find_stretches(one: _IndexedSource, other: _IndexedSource, like: NDArray[np.bool_]) -> tuple[Stretch, ...]:
+def _find_stretches(
+    first_source: _IndexedSource, second_source: _IndexedSource, is_shared: NDArray[np.bool_]
+) -> tuple[Stretch, ...]:
     """Return the longest common stretches, found from the top of one source, the longest first."""
-    own, others = _map_own_grams(one), _map_own_grams(other)
+    first_grams, second_grams = _map_own_grams(first_source), _map_own_grams(second_source)
     places: dict[int, list[int]] = {}
-    for place, number in others.items():
+    for place, number in second_grams.items():
         places.setdefault(number, []).append(place)
-    found: list[tuple[int, int, int]] = []
+    stretches: list[tuple[int, int, int]] = []
     end = 0
-    for begin in np.flatnonzero(like).tolist():
-        if begin >= end:
-            runs = [(_measure_run(own, others, begin, at), -at) for at in places[own[begin]][:_MOST_PLACES]]
-            length, at = max(runs)
-            found.append((begin, -at, length))
-            end = begin + length + GRAM - 1
-    longest = sorted(found, key=lambda each: (-each[2], each[0]))[:_MOST_STRETCHES]
-    return tuple(_build_stretch(one, other, each) for each in longest)
+    for start in np.flatnonzero(is_shared).tolist():
+        if start >= end:
+            runs = [
+                (_measure_run(first_grams, second_grams, start, at), -at)
+                for at in places[first_grams[start]][:_MOST_PLACES]
+            ]
+            length, negated_start = max(runs)
+            stretches.append((start, -negated_start, length))
+            end = start + length + GRAM - 1
+    longest = sorted(stretches, key=lambda each: (-each[2], each[0]))[:_MOST_STRETCHES]
+    return tuple(_build_stretch(first_source, second_source, each) for each in longest)
 
 
 def _map_own_grams(indexed: _IndexedSource) -> dict[int, int]:
@@ -233,19 +250,25 @@ def _map_own_grams(indexed: _IndexedSource) -> dict[int, int]:
     return dict(zip(places.tolist(), indexed.grams[places].tolist(), strict=True))
 
 
-def _measure_run(own: Mapping[int, int], others: Mapping[int, int], begin: int, at: int) -> int:
+def _measure_run(
+    first_grams: Mapping[int, int], second_grams: Mapping[int, int], first_start: int, second_start: int
+) -> int:
     """Return how many consecutive grams are equal from there on."""
     length = 0
-    while (number := own.get(begin + length)) is not None and number == others.get(at + length):
+    while (number := first_grams.get(first_start + length)) is not None and number == second_grams.get(
+        second_start + length
+    ):
         length += 1
     return length
 
 
-def _build_stretch(one: _IndexedSource, other: _IndexedSource, grams_in_row: tuple[int, int, int]) -> Stretch:
-    begin, at, count = grams_in_row
+def _build_stretch(
+    first_source: _IndexedSource, second_source: _IndexedSource, grams_in_row: tuple[int, int, int]
+) -> Stretch:
+    first_start, second_start, count = grams_in_row
     size = count + GRAM - 1
-    lines = one.source.tokens.lines[begin : begin + size]
-    other_lines = other.source.tokens.lines[at : at + size]
+    lines = first_source.source.tokens.lines[first_start : first_start + size]
+    other_lines = second_source.source.tokens.lines[second_start : second_start + size]
     return Stretch(_compute_span(lines), _compute_span(other_lines), size)
 
 

@@ -22,27 +22,27 @@ MOST_FILES = 20
 
 def extract_sources(submission: Submission) -> Mapping[str, str]:
     """Return the texts by name. A notebook's code cells form one text, in order."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for part in (submission.program, submission.responder):
         if part is not None:
-            found[part.name] = part.text
+            texts[part.name] = part.text
     if submission.notebook is not None:
-        found[submission.notebook.name] = "\n\n".join(cell.source for cell in submission.notebook.cells)
-    found |= {name: code.text for name, code in submission.python_files.items() if name not in found}
-    return dict(list(found.items())[:MOST_FILES])
+        texts[submission.notebook.name] = "\n\n".join(cell.source for cell in submission.notebook.cells)
+    texts |= {name: code.text for name, code in submission.python_files.items() if name not in texts}
+    return dict(list(texts.items())[:MOST_FILES])
 
 
-def collect_given_code(assignment: Assignment, more: Path | None = None) -> tuple[str, ...]:
-    """Return the code that students are given: the assignment's, its starter, the library's responders, and ``more``.
+def collect_given_code(assignment: Assignment, path: Path | None = None) -> tuple[str, ...]:
+    """Return the code that students are given: the assignment's, its starter, the library's responders, and ``path``.
 
     Only the catalogue has starters, because stored assignments lack them.
 
     Raises:
-        UsageError: ``more`` cannot be read.
+        UsageError: ``path`` cannot be read.
     """
     texts = [*assignment.given_parts.values(), *(text for _, text in _decode_python_files(assignment.given))]
     texts += map(library.source, library.names())
-    folders = [] if more is None else [more]
+    folders = [] if path is None else [path]
     if assignment.id in list_catalogue_ids():
         folders.append(locate_assignment_folder(assignment.id) / "starter")
     return (*texts, *(text for folder in folders for text in _read_python_files(folder)))

@@ -60,11 +60,11 @@ def tokenise_source(source: str) -> Tokens:
     Operands that may be swapped are in a fixed order, so line numbers need not ascend within a statement.
     """
     statements = [_filter_statement(statement) for statement in _split_statements(source)]
-    own = _collect_own_names([piece for statement in statements for piece in statement])
+    own_names = _collect_own_names([piece for statement in statements for piece in statement])
     words = [
         word
         for statement in statements
-        for word in normalise_statement([Word(_normalise_text(piece, own), piece.line) for piece in statement])
+        for word in normalise_statement([Word(_normalise_text(piece, own_names), piece.line) for piece in statement])
     ]
     return Tokens(
         np.array([zlib.crc32(word.text.encode("utf-8", "surrogatepass")) for word in words], np.uint64),
@@ -99,29 +99,29 @@ def _filter_statement(statement: list[_RawToken]) -> list[_RawToken]:
 
 def _collect_own_names(pieces: Sequence[_RawToken]) -> frozenset[str]:
     """Return the names that the author chose, as their places show: assigned, defined, looped over."""
-    own: set[str] = set()
-    until = ""
-    target: list[str] = []
+    own_names: set[str] = set()
+    closing_text = ""
+    targets: list[str] = []
     line = 0
     for number, piece in enumerate(pieces):
-        after_dot = number > 0 and pieces[number - 1].text == "."
+        is_after_dot = number > 0 and pieces[number - 1].text == "."
         if piece.line != line:
-            line, target = piece.line, []
+            line, targets = piece.line, []
         if piece.text in _ASSIGNING:
-            own.update(target)
-            target = []
-        if piece.text == until:
-            until = ""
+            own_names.update(targets)
+            targets = []
+        if piece.text == closing_text:
+            closing_text = ""
         elif piece.text in _BINDING:
-            until = _BINDING[piece.text]
-        elif piece.kind == "name" and not after_dot and not iskeyword(piece.text):
-            target.append(piece.text)
-            if until:
-                own.add(piece.text)
-    return frozenset(own)
+            closing_text = _BINDING[piece.text]
+        elif piece.kind == "name" and not is_after_dot and not iskeyword(piece.text):
+            targets.append(piece.text)
+            if closing_text:
+                own_names.add(piece.text)
+    return frozenset(own_names)
 
 
-def _normalise_text(piece: _RawToken, own: frozenset[str]) -> str:
+def _normalise_text(piece: _RawToken, own_names: frozenset[str]) -> str:
     if piece.kind in ("text", "number"):
         return piece.kind
-    return "name" if piece.text in own else piece.text
+    return "name" if piece.text in own_names else piece.text

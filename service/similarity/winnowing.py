@@ -25,20 +25,20 @@ def compute_grams(tokens: Tokens) -> NDArray[np.uint64]:
     """Return a number for each run of GRAM tokens, in order; equal runs have equal numbers."""
     if len(tokens) < GRAM:
         return np.empty(0, np.uint64)
-    mixed = (tokens.numbers + np.uint64(1)) * _FACTOR
-    mixed ^= mixed >> np.uint64(29)
-    made = np.zeros(len(tokens) - GRAM + 1, np.uint64)
-    for place in range(GRAM):
-        made = made * _MIX + mixed[place : place + len(made)]
-    return made ^ (made >> np.uint64(32))
+    mixed_numbers = (tokens.numbers + np.uint64(1)) * _FACTOR
+    mixed_numbers ^= mixed_numbers >> np.uint64(29)
+    grams = np.zeros(len(tokens) - GRAM + 1, np.uint64)
+    for offset in range(GRAM):
+        grams = grams * _MIX + mixed_numbers[offset : offset + len(grams)]
+    return grams ^ (grams >> np.uint64(32))
 
 
 def mark_varied_grams(tokens: Tokens) -> NDArray[np.bool_]:
     """Return for each gram whether it has enough different tokens. Grams of number tables don't."""
     if len(tokens) < GRAM:
         return np.empty(0, np.bool_)
-    in_order = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
-    steps = np.count_nonzero(in_order[:, 1:] != in_order[:, :-1], axis=1)
+    sorted_windows = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
+    steps = np.count_nonzero(sorted_windows[:, 1:] != sorted_windows[:, :-1], axis=1)
     return np.asarray(steps + 1 >= FEWEST_DIFFERENT_TOKENS)
 
 
@@ -48,8 +48,8 @@ def select_fingerprints(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:
         return np.empty(0, np.int64)
     size = min(WINDOW, len(numbers))
     windows = sliding_window_view(numbers, size)[:, ::-1]
-    least = size - 1 - windows.argmin(axis=1)
-    return np.unique(least + np.arange(len(windows)))
+    offsets = size - 1 - windows.argmin(axis=1)
+    return np.unique(offsets + np.arange(len(windows)))
 
 
 def mark_covered_tokens(places: NDArray[np.bool_], tokens: int) -> NDArray[np.bool_]:

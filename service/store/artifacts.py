@@ -32,12 +32,12 @@ class File:
     data: bytes
 
 
-def store_files(session: Session, job_id: str, files: list[File], at: datetime) -> None:
+def store_files(session: Session, job_id: str, files: list[File], current_time: datetime) -> None:
     """Store the files of a job, replacing files with the same name. Raises HostError for a file over the cap."""
     for file in files:
-        compressed = zlib.compress(file.data, 6)
-        if len(compressed) > CAP_BYTES:
-            raise HostError(f"{file.name} is too large to be kept: {len(compressed)} bytes of {CAP_BYTES}")
+        compressed_data = zlib.compress(file.data, 6)
+        if len(compressed_data) > CAP_BYTES:
+            raise HostError(f"{file.name} is too large to be kept: {len(compressed_data)} bytes of {CAP_BYTES}")
         session.execute(delete(Artifact).where(Artifact.job_id == job_id, Artifact.name == file.name))
         session.add(
             Artifact(
@@ -46,8 +46,8 @@ def store_files(session: Session, job_id: str, files: list[File], at: datetime) 
                 media_type=file.media_type,
                 sha256=hashlib.sha256(file.data).hexdigest(),
                 size=len(file.data),
-                compressed=compressed,
-                created_at=at,
+                compressed=compressed_data,
+                created_at=current_time,
             )
         )
 
@@ -64,23 +64,23 @@ def load_each_files(
 
     Only the files of one job are in memory at a time. Raises HostError if a file does not match its hash.
     """
-    mine = and_(Artifact.job_id == Job.id, Artifact.name.startswith(prefix, autoescape=True))
+    has_prefix = and_(Artifact.job_id == Job.id, Artifact.name.startswith(prefix, autoescape=True))
     query = (
         select(Job.id, Artifact.name, Artifact.media_type, Artifact.sha256, Artifact.compressed)
-        .outerjoin(Artifact, mine)
+        .outerjoin(Artifact, has_prefix)
         .where(Job.id.in_(job_ids))
         .order_by(Job.id, Artifact.name)
     )
     rows = session.execute(query, execution_options={"yield_per": _AT_ONCE})
-    for job_id, of_job in groupby(rows, key=lambda row: row[0]):
+    for job_id, job_rows in groupby(rows, key=lambda row: row[0]):
         # A job without such files yields one row without a file.
-        kept = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in of_job if name is not None]
-        yield job_id, {each[0]: _unpack_file(job_id, *each) for each in kept}
+        files = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in job_rows if name is not None]
+        yield job_id, {each[0]: _unpack_file(job_id, *each) for each in files}
 
 
-def _unpack_file(job_id: str, name: str, media_type: str, sha256: str, compressed: bytes) -> File:
+def _unpack_file(job_id: str, name: str, media_type: str, sha256: str, compressed_data: bytes) -> File:
     try:
-        data = zlib.decompress(compressed)
+        data = zlib.decompress(compressed_data)
     except zlib.error as error:
         raise HostError(f"The database is damaged: {name} of {job_id}: {error}") from None
     if hashlib.sha256(data).hexdigest() != sha256:

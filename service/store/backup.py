@@ -68,14 +68,14 @@ def restore(file: Path, target: Engine) -> None:
     if not file.is_file():
         raise UsageError(f"{file}: does not exist, {_EXPECTED}")
     with tempfile.TemporaryDirectory(prefix="robomark-restore-") as folder:
-        copy = Path(folder) / "copy.db"
+        snapshot = Path(folder) / "copy.db"
         try:
-            _copy_file(file, copy)
+            _copy_file(file, snapshot)
         except sqlite3.Error as error:
             raise UsageError(
                 f"{file}: cannot be read ({error}), expected a file that robomark db backup made"
             ) from None
-        with _open_file(copy) as source:
+        with _open_file(snapshot) as source:
             if load_current_revision(source) is None:
                 raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
             upgrade_database(source)
@@ -94,9 +94,9 @@ def _open_file(file: Path) -> Iterator[Engine]:
 def _copy_file(source: Path, target: Path) -> None:
     with (
         closing(sqlite3.connect(f"{source.absolute().as_uri()}?mode=ro", uri=True)) as live,
-        closing(sqlite3.connect(target)) as copy,
+        closing(sqlite3.connect(target)) as target_connection,
     ):
-        live.backup(copy)
+        live.backup(target_connection)
 
 
 def _copy_rows(source: Engine, target: Engine) -> None:
@@ -104,45 +104,53 @@ def _copy_rows(source: Engine, target: Engine) -> None:
     for engine in (source, target):
         revision = load_current_revision(engine)
         if revision != find_newest_revision():
-            where = engine.url.render_as_string(hide_password=True)
+            database_url = engine.url.render_as_string(hide_password=True)
             raise HostError(
-                f"The tables of {where} are at revision {revision}, this Robomark copies those at "
+                f"The tables of {database_url} are at revision {revision}, this Robomark copies those at "
                 f"{find_newest_revision()}: "
                 "use the release that they are of."
             )
-    reading = source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source
-    with reading.connect() as rows, target.begin() as into:
-        if into.scalar(select(func.count()).select_from(Course)) or into.scalar(select(func.count()).select_from(Job)):
-            where = target.url.render_as_string(hide_password=True)
-            raise UsageError(f"the database {where} is not empty, expected one in which nothing was submitted yet")
+    snapshot_engine = (
+        source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source
+    )
+    with snapshot_engine.connect() as source_connection, target.begin() as target_connection:
+        if target_connection.scalar(select(func.count()).select_from(Course)) or target_connection.scalar(
+            select(func.count()).select_from(Job)
+        ):
+            database_url = target.url.render_as_string(hide_password=True)
+            raise UsageError(
+                f"the database {database_url} is not empty, expected one in which nothing was submitted yet"
+            )
         # Both rows were created with the target's tables and are replaced. The restored secret determines the worlds.
-        into.execute(delete(Installation))
-        into.execute(delete(SchemaCompatibility))
+        target_connection.execute(delete(Installation))
+        target_connection.execute(delete(SchemaCompatibility))
         for table in METADATA.sorted_tables:
-            _copy_table(table, rows, into)
+            _copy_table(table, source_connection, target_connection)
 
 
-def _copy_table(table: Table, rows: Connection, into: Connection) -> None:
+def _copy_table(table: Table, source_connection: Connection, target_connection: Connection) -> None:
     """Copy a table. References within the table are set last, because a row may refer to a later one."""
-    own = [column for column in table.columns if any(key.column.table is table for key in column.foreign_keys)]
-    later: list[dict[str, Any]] = []
+    self_references = [
+        column for column in table.columns if any(key.column.table is table for key in column.foreign_keys)
+    ]
+    reference_rows: list[dict[str, Any]] = []
     (key,) = table.primary_key.columns
-    found = rows.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table))
-    for some in found.mappings().partitions():
-        into.execute(insert(table), [_clear_columns(row, own) for row in some])
-        later += [
-            {"of": row[key.name], **{column.name: row[column.name] for column in own}}
-            for row in some
-            if any(row[column.name] is not None for column in own)
+    all_rows = source_connection.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table))
+    for chunk in all_rows.mappings().partitions():
+        target_connection.execute(insert(table), [_clear_columns(row, self_references) for row in chunk])
+        reference_rows += [
+            {"of": row[key.name], **{column.name: row[column.name] for column in self_references}}
+            for row in chunk
+            if any(row[column.name] is not None for column in self_references)
         ]
-    if later:
-        values: dict[str, Any] = {column.name: bindparam(column.name) for column in own}
-        into.execute(update(table).where(key == bindparam("of")).values(values), later)
-    last = into.scalar(select(func.max(key)))
-    if into.dialect.name == "postgresql" and isinstance(last, int):
+    if reference_rows:
+        values: dict[str, Any] = {column.name: bindparam(column.name) for column in self_references}
+        target_connection.execute(update(table).where(key == bindparam("of")).values(values), reference_rows)
+    last_key = target_connection.scalar(select(func.max(key)))
+    if target_connection.dialect.name == "postgresql" and isinstance(last_key, int):
         # New rows get the next free numbers.
         sequence = func.pg_get_serial_sequence(table.name, key.name)
-        into.execute(select(func.setval(sequence, last)))
+        target_connection.execute(select(func.setval(sequence, last_key)))
 
 
 def _clear_columns(row: Mapping[Any, Any], columns: list[Column[Any]]) -> dict[str, Any]:

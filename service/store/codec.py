@@ -76,8 +76,8 @@ def decode(kind: type[T], value: Json) -> T:
 
 def decode_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
     """Return decoded arguments for the dataclass ``kind`` from the fields present; the caller adds the others."""
-    known = _load_type_hints(kind)
-    return {name: _decode_value(known[name], item) for name, item in value.items() if name in known}
+    field_types = _load_type_hints(kind)
+    return {name: _decode_value(field_types[name], item) for name, item in value.items() if name in field_types}
 
 
 @cache
@@ -114,9 +114,9 @@ def _decode_value(kind: Any, value: Any) -> Any:
     if origin is not None and issubclass(origin, Mapping):
         return {key: _decode_value(get_args(kind)[1], item) for key, item in value.items()}
     if is_dataclass(kind):
-        known = _load_type_hints(cast(type, kind))
+        field_types = _load_type_hints(cast(type, kind))
         return cast(type, kind)(
-            **{name: _decode_value(known[name], item) for name, item in value.items() if name in known}
+            **{name: _decode_value(field_types[name], item) for name, item in value.items() if name in field_types}
         )
     return _decode_scalar(kind, value)
 
@@ -124,10 +124,10 @@ def _decode_value(kind: Any, value: Any) -> Any:
 def _decode_union(kinds: tuple[Any, ...], value: Any) -> Any:
     if value is None and type(None) in kinds:
         return None
-    rest = [kind for kind in kinds if kind is not type(None)]
-    if len(rest) != 1:
-        raise TypeError(f"cannot tell which of {rest} is meant")
-    return _decode_value(rest[0], value)
+    value_kinds = [kind for kind in kinds if kind is not type(None)]
+    if len(value_kinds) != 1:
+        raise TypeError(f"cannot tell which of {value_kinds} is meant")
+    return _decode_value(value_kinds[0], value)
 
 
 def _decode_tuple(kinds: tuple[Any, ...], value: Sequence[Any]) -> tuple[Any, ...]:

@@ -84,8 +84,8 @@ class ExactDecimal(TypeDecorator[Decimal]):
         def operate(self, op: OperatorType, *other: Any, **kwargs: Any) -> ColumnElement[Any]:
             """Apply the operator to the numeric values of both sides."""
             numbers = (cast(each, Float) if _is_expression(each) else each for each in other)
-            compared: ColumnElement[Any] = op(cast(self.expr, Float), *numbers, **kwargs)
-            return compared
+            comparison: ColumnElement[Any] = op(cast(self.expr, Float), *numbers, **kwargs)
+            return comparison
 
     comparator_factory: Any = Comparator
 

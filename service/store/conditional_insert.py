@@ -14,5 +14,5 @@ def insert_if_new(session: Session, table: type[models.Base], **values: object) 
         from sqlalchemy.dialects.postgresql import insert
     else:
         from sqlalchemy.dialects.sqlite import insert  # type: ignore[assignment]
-    made = insert(table).values(**values).on_conflict_do_nothing().returning(*table.__mapper__.primary_key)
-    return session.execute(made).first() is not None
+    statement = insert(table).values(**values).on_conflict_do_nothing().returning(*table.__mapper__.primary_key)
+    return session.execute(statement).first() is not None

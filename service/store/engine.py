@@ -118,18 +118,18 @@ def open_engine(url: str) -> Engine:
     Errors do not include the values of a statement, because the installation's secret may be one. Raises HostError if
     the folder cannot be created.
     """
-    parsed = make_url(url)
-    if parsed.get_backend_name() != "sqlite":
-        return create_engine(parsed, pool_pre_ping=True, pool_size=2, max_overflow=8, hide_parameters=True)
-    if parsed.database and parsed.database != ":memory:":
-        folder = Path(parsed.database).absolute().parent
+    database_url = make_url(url)
+    if database_url.get_backend_name() != "sqlite":
+        return create_engine(database_url, pool_pre_ping=True, pool_size=2, max_overflow=8, hide_parameters=True)
+    if database_url.database and database_url.database != ":memory:":
+        folder = Path(database_url.database).absolute().parent
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise HostError(f"The folder for the database cannot be made: {folder}: {error.strerror}") from None
     # One connection per transaction: finished threads leave none open.
     engine = create_engine(
-        parsed, poolclass=NullPool, connect_args={"timeout": SQLITE_BUSY_SECONDS}, hide_parameters=True
+        database_url, poolclass=NullPool, connect_args={"timeout": SQLITE_BUSY_SECONDS}, hide_parameters=True
     )
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_immediate)
@@ -159,8 +159,8 @@ def open_store(settings: Settings) -> Store:
 
     Raises HostError if it cannot be reached or needs a newer Robomark, UsageError if other users share the home folder.
     """
-    parsed = make_url(settings.database)
-    file = Path(str(parsed.database)).absolute() if parsed.get_backend_name() == "sqlite" else None
+    database_url = make_url(settings.database)
+    file = Path(str(database_url.database)).absolute() if database_url.get_backend_name() == "sqlite" else None
     if file is not None and settings.home in file.parents:
         open_home(settings.home)
     engine = open_engine(settings.database)
@@ -173,8 +173,8 @@ def open_store(settings: Settings) -> Store:
             upgrade_database(engine)
     except OperationalError as error:
         engine.dispose()
-        where = engine.url.render_as_string(hide_password=True)
-        raise HostError(f"The database {where} cannot be used: {error.orig}") from None
+        shown_url = engine.url.render_as_string(hide_password=True)
+        raise HostError(f"The database {shown_url} cannot be used: {error.orig}") from None
     except BaseException:
         engine.dispose()
         raise

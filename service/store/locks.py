@@ -24,28 +24,28 @@ def lock_course(session: Session, course_id: int) -> None:
 
 def lock_persons(session: Session, *ids: int) -> None:
     """Lock persons until the end of the transaction. Raises NoResultFound if one no longer exists."""
-    for each in sorted(ids):
-        session.execute(select(Person.id).where(Person.id == each).with_for_update(key_share=True)).one()
+    for person_id in sorted(ids):
+        session.execute(select(Person.id).where(Person.id == person_id).with_for_update(key_share=True)).one()
 
 
-def lock_jobs(session: Session, *which: ColumnElement[bool]) -> None:
+def lock_jobs(session: Session, *conditions: ColumnElement[bool]) -> None:
     """Lock the jobs that match these conditions until the end of the transaction."""
-    session.execute(_select_jobs_for_update(*which)).all()
+    session.execute(_select_jobs_for_update(*conditions)).all()
 
 
-def lock_submissions(session: Session, *which: ColumnElement[bool]) -> None:
+def lock_submissions(session: Session, *conditions: ColumnElement[bool]) -> None:
     """Lock the submissions that match these conditions until the end of the transaction.
 
     Take this lock before changing the standing job of a submission: a lock on jobs does not stop new ones.
     """
-    query = select(SubmissionRow.id).where(*which).order_by(SubmissionRow.id)
+    query = select(SubmissionRow.id).where(*conditions).order_by(SubmissionRow.id)
     session.execute(query.with_for_update(key_share=True)).all()
 
 
-def match_and_lock_jobs(*which: ColumnElement[bool]) -> ColumnElement[bool]:
+def match_and_lock_jobs(*conditions: ColumnElement[bool]) -> ColumnElement[bool]:
     """Return a condition for an UPDATE of several jobs, which locks them in order before the first change."""
-    return Job.id.in_(_select_jobs_for_update(*which))
+    return Job.id.in_(_select_jobs_for_update(*conditions))
 
 
-def _select_jobs_for_update(*which: ColumnElement[bool]) -> Select[str]:
-    return select(Job.id).where(*which).order_by(Job.id).with_for_update(key_share=True)
+def _select_jobs_for_update(*conditions: ColumnElement[bool]) -> Select[str]:
+    return select(Job.id).where(*conditions).order_by(Job.id).with_for_update(key_share=True)

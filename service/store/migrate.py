@@ -61,11 +61,11 @@ def apply_migrations(connection: Connection) -> None:
     from alembic.script import ScriptDirectory
 
     config = build_alembic_config(connection)
-    present = read_revision(connection)
-    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if present is not None and present not in known:
+    current_revision = read_revision(connection)
+    known_revisions = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if current_revision is not None and current_revision not in known_revisions:
         raise HostError(
-            f"The database was made by a newer Robomark (its tables are at {present}); "
+            f"The database was made by a newer Robomark (its tables are at {current_revision}); "
             "upgrade this Robomark, or restore a backup: there is no way down."
         )
     command.upgrade(config, "head")

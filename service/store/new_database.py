@@ -30,5 +30,5 @@ def create_tables(connection: Connection, revision: str) -> None:
     for statement in SCHEMA_FILE.read_text(encoding="utf-8").split(STATEMENT_SEPARATOR):
         connection.exec_driver_sql(statement)
     connection.exec_driver_sql("INSERT INTO alembic_version VALUES (?)", (revision,))
-    made = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}
-    connection.execute(insert(Installation).values(made))
+    installation_values = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}
+    connection.execute(insert(Installation).values(installation_values))

@@ -78,10 +78,12 @@ def emit_batch_finished(session: Session, batch_id: str) -> None:
         _add_batch_finished(session, hooks, batch_id)
 
 
-def emit_superseded_batches(session: Session, submissions: Select[int], at: datetime) -> None:
+def emit_superseded_batches(session: Session, submissions: Select[int], cancelled_at: datetime) -> None:
     """Report the batches of jobs that were cancelled at this time for newer submissions."""
-    which = (Job.submission_id.in_(submissions), Job.state == JobState.CANCELLED, Job.finished_at == at)
-    for batch_id in session.scalars(select(Job.batch_id).where(*which, Job.batch_id.is_not(None)).distinct()).all():
+    conditions = (Job.submission_id.in_(submissions), Job.state == JobState.CANCELLED, Job.finished_at == cancelled_at)
+    for batch_id in session.scalars(
+        select(Job.batch_id).where(*conditions, Job.batch_id.is_not(None)).distinct()
+    ).all():
         emit_batch_finished(session, str(batch_id))
 
 
@@ -92,15 +94,15 @@ def emit_grades_published(session: Session, course_id: int, **told: object) -> N
 
 def emit_appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
     """Report that a student opened an appeal."""
-    of_submission = select(Enrolment.course_id).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
-    course_id = session.scalars(of_submission.where(SubmissionRow.id == submission_id)).one()
-    told = {"appeal": appeal_id, "submission": submission_id}
-    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.APPEAL_OPENED, told)
+    course_query = select(Enrolment.course_id).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
+    course_id = session.scalars(course_query.where(SubmissionRow.id == submission_id)).one()
+    payload = {"appeal": appeal_id, "submission": submission_id}
+    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.APPEAL_OPENED, payload)
 
 
 @retry_conflicts
-def claim_deliveries(store: Store, most: int) -> list[ClaimedDelivery]:
-    """Claim the oldest due delivery of up to ``most`` webhooks; no other process gets them until the claim expires.
+def claim_deliveries(store: Store, limit: int) -> list[ClaimedDelivery]:
+    """Claim the oldest due delivery of up to ``limit`` webhooks; no other process gets them until the claim expires.
 
     Each webhook has at most one claimed delivery. Webhooks of courses with fewer claimed deliveries come first.
     """
@@ -108,17 +110,24 @@ def claim_deliveries(store: Store, most: int) -> list[ClaimedDelivery]:
         if not _choose_webhooks(session, now(session), 1):
             return []
     with store.transaction() as session:
-        at = now(session)
-        given_up = (Delivery.delivered_at.is_(None), Delivery.due_at.is_(None), Delivery.made_at < at - _RETENTION)
-        session.execute(delete(Delivery).where(or_(Delivery.delivered_at < at - _RETENTION, and_(*given_up))))
-        chosen = select(Webhook).where(Webhook.id.in_(_choose_webhooks(session, at, most)))
+        current_time = now(session)
+        is_abandoned = (
+            Delivery.delivered_at.is_(None),
+            Delivery.due_at.is_(None),
+            Delivery.made_at < current_time - _RETENTION,
+        )
+        session.execute(
+            delete(Delivery).where(or_(Delivery.delivered_at < current_time - _RETENTION, and_(*is_abandoned)))
+        )
+        chosen = select(Webhook).where(Webhook.id.in_(_choose_webhooks(session, current_time, limit)))
         hooks = session.scalars(chosen.order_by(Webhook.id).with_for_update(skip_locked=True, key_share=True)).all()
         # Another process may have claimed a delivery of a webhook before it was locked here.
-        busy = _load_busy_webhooks(session, at)
+        busy = _load_busy_webhooks(session, current_time)
         return [
-            claimed
+            claimed_deliveries
             for hook in hooks
-            if hook.id not in busy and (claimed := _claim_oldest_delivery(session, hook, at)) is not None
+            if hook.id not in busy
+            and (claimed_deliveries := _claim_oldest_delivery(session, hook, current_time)) is not None
         ]
 
 
@@ -161,31 +170,33 @@ def _is_due(at: datetime) -> tuple[ColumnElement[bool], ...]:
 
 
 @retry_conflicts
-def record_delivery(store: Store, claimed: ClaimedDelivery) -> None:
+def record_delivery(store: Store, delivery: ClaimedDelivery) -> None:
     """Record that a delivery succeeded."""
     with store.transaction() as session:
         values = {"delivered_at": now(session), "error": None}
-        session.execute(update(Delivery).where(Delivery.id == claimed.id).values(**values))
+        session.execute(update(Delivery).where(Delivery.id == delivery.id).values(**values))
 
 
 @retry_conflicts
-def record_failure(store: Store, claimed: ClaimedDelivery, error: str) -> None:
+def record_failure(store: Store, delivery: ClaimedDelivery, error: str) -> None:
     """Record that a delivery failed: it is retried later, or given up after a day."""
-    wait = min(_FIRST_WAIT * 2 ** min(claimed.attempt - 1, 20), _LONGEST_WAIT)
+    delay = min(_FIRST_WAIT * 2 ** min(delivery.attempt - 1, 20), _LONGEST_WAIT)
     with store.transaction() as session:
-        again = now(session) + wait
-        due_at = again if again < claimed.made_at + RETRY_PERIOD else None
-        mine = (Delivery.id == claimed.id, Delivery.attempts == claimed.attempt, Delivery.due_at.is_not(None))
-        session.execute(update(Delivery).where(*mine).values(due_at=due_at, error=error[:500]))
+        retry_at = now(session) + delay
+        due_at = retry_at if retry_at < delivery.made_at + RETRY_PERIOD else None
+        is_claimed = (Delivery.id == delivery.id, Delivery.attempts == delivery.attempt, Delivery.due_at.is_not(None))
+        session.execute(update(Delivery).where(*is_claimed).values(due_at=due_at, error=error[:500]))
 
 
 def _add_grade_finished(session: Session, hooks: Sequence[Webhook], job_id: str) -> None:
     query = select(Job.batch_id, Job.standing, SubmissionRow.id, SubmissionRow.assignment, SubmissionRow.attempt)
-    found = session.execute(query.join(SubmissionRow, Job.submission_id == SubmissionRow.id).where(Job.id == job_id))
-    batch_id, standing, submission_id, assignment, attempt = found.one()
-    told: dict[str, object] = {"job": job_id, "batch": batch_id, "standing": standing.value}
-    told |= {"submission": submission_id, "assignment": assignment, "attempt": attempt}
-    _add_deliveries(session, hooks, WebhookEvent.GRADE_FINISHED, told)
+    grade_row = session.execute(
+        query.join(SubmissionRow, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
+    )
+    batch_id, grade_standing, submission_id, assignment, attempt = grade_row.one()
+    payload: dict[str, object] = {"job": job_id, "batch": batch_id, "standing": grade_standing.value}
+    payload |= {"submission": submission_id, "assignment": assignment, "attempt": attempt}
+    _add_deliveries(session, hooks, WebhookEvent.GRADE_FINISHED, payload)
 
 
 def _load_job_webhooks(session: Session, job_id: str) -> Sequence[Webhook]:
@@ -208,21 +219,25 @@ def _add_batch_finished(session: Session, hooks: Sequence[Webhook], batch_id: st
         # If two workers end the last two jobs at once, the second must see the change of the first.
         number = int.from_bytes(hashlib.sha256(batch_id.encode()).digest()[:8], signed=True)
         session.execute(select(func.pg_advisory_xact_lock(number)))
-    takes_in = (OpenAssignment.batch_id == batch_id, OpenAssignment.closed_at.is_(None))
-    if session.scalar(select(OpenAssignment.id).where(*takes_in)) is not None:
+    accepts_submissions = (OpenAssignment.batch_id == batch_id, OpenAssignment.closed_at.is_(None))
+    if session.scalar(select(OpenAssignment.id).where(*accepts_submissions)) is not None:
         return
-    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
-    states = dict(session.execute(counted.group_by(Job.state)).all())
+    count_query = select(Job.state, func.count()).where(Job.batch_id == batch_id, Job.suspect.is_(None))
+    states = dict(session.execute(count_query.group_by(Job.state)).all())
     if states and not any(state in UNFINISHED for state in states):
-        told = {"batch": batch_id, "states": {state.value: count for state, count in states.items()}}
-        _add_deliveries(session, hooks, WebhookEvent.BATCH_FINISHED, told)
+        payload = {"batch": batch_id, "states": {state.value: count for state, count in states.items()}}
+        _add_deliveries(session, hooks, WebhookEvent.BATCH_FINISHED, payload)
 
 
 def _add_deliveries(
-    session: Session, hooks: Sequence[Webhook], event: WebhookEvent, told: Mapping[str, object]
+    session: Session, hooks: Sequence[Webhook], event: WebhookEvent, event_data: Mapping[str, object]
 ) -> None:
     for hook in hooks:
         if event.value in hook.events:
-            at = now(session)
-            payload = {"course": hook.course_id, "data": dict(told)}
-            session.add(Delivery(webhook_id=hook.id, event=event.value, payload=payload, made_at=at, due_at=at))
+            current_time = now(session)
+            payload = {"course": hook.course_id, "data": dict(event_data)}
+            session.add(
+                Delivery(
+                    webhook_id=hook.id, event=event.value, payload=payload, made_at=current_time, due_at=current_time
+                )
+            )

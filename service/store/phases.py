@@ -32,13 +32,13 @@ SPANS: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 def encode_times(moments: Mapping[str, datetime | None]) -> dict[str, str]:
     """Return the times as stored: ISO 8601 by name, in order, without those that are None."""
-    present = {name: moments.get(name) for name in NAMES}
-    return {name: moment.isoformat() for name, moment in present.items() if moment is not None}
+    moments_by_name = {name: moments.get(name) for name in NAMES}
+    return {name: moment.isoformat() for name, moment in moments_by_name.items() if moment is not None}
 
 
-def compute_durations(stored: Any) -> dict[str, timedelta]:
+def compute_durations(stored_times: Any) -> dict[str, timedelta]:
     """Return the duration of each span in ``SPANS`` with both ends stored."""
-    moments = {name: datetime.fromisoformat(text) for name, text in dict(stored or {}).items() if name in NAMES}
+    moments = {name: datetime.fromisoformat(text) for name, text in dict(stored_times or {}).items() if name in NAMES}
     return {
         span: moments[end] - moments[start]
         for span, (start, end) in SPANS.items()

@@ -52,7 +52,7 @@ class PurgeCounts:
 
 @retry_conflicts
 def purge_submissions(
-    store: Store, before: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
+    store: Store, cutoff: datetime, actor: str, *, course_id: int | None = None, only_count: bool = False
 ) -> PurgeCounts:
     """Remove the submissions accepted before a moment, with their results, and students without remaining submissions.
 
@@ -61,14 +61,14 @@ def purge_submissions(
     """
     with store.transaction() as session:
         _TEMPORARY.create_all(session.connection())
-        _mark_old_submissions(session, before, course_id)
-        found = _count_marked_rows(session)
-        if found.submissions and not only_count:
+        _mark_old_submissions(session, cutoff, course_id)
+        counts = _count_marked_rows(session)
+        if counts.submissions and not only_count:
             _delete_marked(session)
-            detail = {"submissions": found.submissions, "grades": found.grades, "students": found.students}
-            audit.record_action(session, actor, "purged", "submission", f"before {before.isoformat()}", **detail)
+            detail = {"submissions": counts.submissions, "grades": counts.grades, "students": counts.students}
+            audit.record_action(session, actor, "purged", "submission", f"before {cutoff.isoformat()}", **detail)
         _TEMPORARY.drop_all(session.connection())
-        return found
+        return counts
 
 
 def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
@@ -82,12 +82,12 @@ def remove_student(session: Session, enrolment_id: int, actor: str) -> None:
     erase_student(session, enrolment_id, actor)
 
 
-def has_submitted(session: Session, enrolment_id: int, without: Set[str] = frozenset()) -> bool:
-    """Return whether a student has submitted anything, except to the assignments in ``without``."""
-    own = select(SubmissionRow.id).where(
-        SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(without)
+def has_submitted(session: Session, enrolment_id: int, ignored_assignments: Set[str] = frozenset()) -> bool:
+    """Return whether a student has submitted anything, except to the assignments in ``ignored_assignments``."""
+    own_submissions = select(SubmissionRow.id).where(
+        SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment.not_in(ignored_assignments)
     )
-    return session.scalar(own.limit(1)) is not None
+    return session.scalar(own_submissions.limit(1)) is not None
 
 
 def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCounts:
@@ -100,23 +100,23 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCount
     enrolment = session.get_one(Enrolment, enrolment_id)
     if enrolment.role is not Role.STUDENT:
         raise UsageError(f"{enrolment.student} is not a student of this course")
-    running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
-    if session.scalar(select(Job.id).where(*running).limit(1)) is not None:
+    is_running = (Job.enrolment_id == enrolment_id, Job.state == JobState.RUNNING)
+    if session.scalar(select(Job.id).where(*is_running).limit(1)) is not None:
         raise UsageError(
             f"a submission of {enrolment.student} is being graded; wait until grading is completed, or cancel it"
         )
     _TEMPORARY.create_all(session.connection())
-    own = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
-    session.execute(insert(_GOING).from_select(["id"], own))
+    own_submissions = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
+    session.execute(insert(_GOING).from_select(["id"], own_submissions))
     session.execute(insert(_LEAVING).values(id=enrolment_id))
-    found = _count_marked_rows(session)
+    counts = _count_marked_rows(session)
     _erase_names(session, enrolment)
     _delete_replies(session, enrolment.course_id)
     _delete_marked(session)
-    detail = {"submissions": found.submissions, "grades": found.grades}
+    detail = {"submissions": counts.submissions, "grades": counts.grades}
     audit.record_action(session, actor, "erased", "enrolment", str(enrolment_id), **detail)
     _TEMPORARY.drop_all(session.connection())
-    return found
+    return counts
 
 
 def _count_marked_rows(session: Session) -> PurgeCounts:
@@ -127,15 +127,15 @@ def _count_marked_rows(session: Session) -> PurgeCounts:
 def _erase_names(session: Session, enrolment: Enrolment) -> None:
     """Remove a student's name from other rows: rejections of batches, and the activity log."""
     for batch in session.scalars(select(Batch).where(Batch.course_id == enrolment.course_id)):
-        kept = [each for each in batch.refusals if normalise_name(each["student"]["id"]) != enrolment.student]
-        if len(kept) < len(batch.refusals):
-            batch.refusals = kept
-    of_course = (Audit.subject == "course", Audit.subject_id == str(enrolment.course_id))
-    for row in session.scalars(select(Audit).where(*of_course)):
+        kept_refusals = [each for each in batch.refusals if normalise_name(each["student"]["id"]) != enrolment.student]
+        if len(kept_refusals) < len(batch.refusals):
+            batch.refusals = kept_refusals
+    is_course_entry = (Audit.subject == "course", Audit.subject_id == str(enrolment.course_id))
+    for row in session.scalars(select(Audit).where(*is_course_entry)):
         if row.detail.get("student") == enrolment.student:
             row.detail = {**row.detail, "student": _ERASED}
-    by_them = Audit.actor.endswith(f"(person {enrolment.person_id})", autoescape=True)
-    session.execute(update(Audit).where(by_them).values(actor=f"{_ERASED} (person {enrolment.person_id})"))
+    is_actor = Audit.actor.endswith(f"(person {enrolment.person_id})", autoescape=True)
+    session.execute(update(Audit).where(is_actor).values(actor=f"{_ERASED} (person {enrolment.person_id})"))
 
 
 def _delete_replies(session: Session, course_id: int) -> None:
@@ -151,73 +151,85 @@ def _delete_replies(session: Session, course_id: int) -> None:
     session.execute(delete(IdempotentReply).where(*complete))
 
 
-def _mark_old_submissions(session: Session, before: datetime, course_id: int | None) -> None:
-    unfinished = select(Job.submission_id).where(Job.state.in_(UNFINISHED))
-    old = select(SubmissionRow.id).where(SubmissionRow.created_at < before, SubmissionRow.id.not_in(unfinished))
+def _mark_old_submissions(session: Session, cutoff: datetime, course_id: int | None) -> None:
+    unfinished_ids = select(Job.submission_id).where(Job.state.in_(UNFINISHED))
+    old_submissions = select(SubmissionRow.id).where(
+        SubmissionRow.created_at < cutoff, SubmissionRow.id.not_in(unfinished_ids)
+    )
     if course_id is not None:
-        of_course = select(Enrolment.id).where(Enrolment.course_id == course_id)
-        old = old.where(SubmissionRow.enrolment_id.in_(of_course))
-    session.execute(insert(_GOING).from_select(["id"], old))
+        course_enrolments = select(Enrolment.id).where(Enrolment.course_id == course_id)
+        old_submissions = old_submissions.where(SubmissionRow.enrolment_id.in_(course_enrolments))
+    session.execute(insert(_GOING).from_select(["id"], old_submissions))
     source = aliased(Job)
-    needed = (
+    needed_ids = (
         select(source.submission_id)
         .join(Job, or_(Job.copied_from == source.id, Job.regrade_of == source.id))
         .where(Job.submission_id.not_in(_going))
     )
     # The source of a kept copy may be a copy itself.
-    while session.execute(delete(_GOING).where(_GOING.c.id.in_(needed))).rowcount:  # type: ignore[attr-defined]
+    while session.execute(delete(_GOING).where(_GOING.c.id.in_(needed_ids))).rowcount:  # type: ignore[attr-defined]
         pass
-    losing = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_going))
-    keeping = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_going))
-    session.execute(insert(_LEAVING).from_select(["id"], losing.except_(keeping)))
+    losing_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_going))
+    keeping_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_going))
+    session.execute(insert(_LEAVING).from_select(["id"], losing_enrolments.except_(keeping_enrolments)))
 
 
 def _delete_marked(session: Session) -> None:
-    of_them = Job.submission_id.in_(_going)
-    theirs = select(Job.id).where(of_them)
-    copies = or_(of_them, Job.copied_from.in_(theirs))
+    is_marked = Job.submission_id.in_(_going)
+    marked_jobs = select(Job.id).where(is_marked)
+    is_marked_or_copy = or_(is_marked, Job.copied_from.in_(marked_jobs))
     lock_submissions(session, SubmissionRow.id.in_(_going))
-    lock_jobs(session, copies)
-    session.execute(update(Job).where(copies).values(copied_from=None))
-    session.execute(update(Job).where(of_them).values(regrade_of=None))
+    lock_jobs(session, is_marked_or_copy)
+    session.execute(update(Job).where(is_marked_or_copy).values(copied_from=None))
+    session.execute(update(Job).where(is_marked).values(regrade_of=None))
     # Deleting a job also deletes its trials, results and artifacts.
-    session.execute(delete(Job).where(of_them))
+    session.execute(delete(Job).where(is_marked))
     for column in (Override.submission_id, Comment.submission_id, Appeal.submission_id):
         session.execute(delete(column.class_).where(column.in_(_going)))
     session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(_going)))
-    used = (
+    is_used_batch = (
         Batch.id.in_(select(Job.batch_id).where(Job.batch_id.is_not(None))),
         Batch.id.in_(select(SubmissionRow.batch_id).where(SubmissionRow.batch_id.is_not(None))),
         Batch.id.in_(select(OpenAssignment.batch_id).where(OpenAssignment.batch_id.is_not(None))),
     )
     # A batch of regrades is deleted before its original.
-    session.execute(delete(Batch).where(~or_(*used), Batch.regrade_of.is_not(None)))
-    regraded = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
-    session.execute(delete(Batch).where(~or_(*used), Batch.id.not_in(regraded)))
-    people = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_leaving))))
+    session.execute(delete(Batch).where(~or_(*is_used_batch), Batch.regrade_of.is_not(None)))
+    regraded_batches = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
+    session.execute(delete(Batch).where(~or_(*is_used_batch), Batch.id.not_in(regraded_batches)))
+    person_ids = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_leaving))))
     for column in (Extension.enrolment_id, Tryout.enrolment_id):
         session.execute(delete(column.class_).where(column.in_(_leaving)))
-    needed = [select(table.assignment_version_id) for table in (Job, OpenAssignment, Tryout)]
-    session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(each) for each in needed)))
+    version_queries = [select(table.assignment_version_id) for table in (Job, OpenAssignment, Tryout)]
+    session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(each) for each in version_queries)))
     _sign_out_leaving(session)
     session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
-    in_a_course = select(Enrolment.person_id)
-    for start in range(0, len(people), _AT_ONCE):
-        some = (Person.id.in_(people[start : start + _AT_ONCE]), Person.id.not_in(in_a_course), ~Person.operator)
-        gone = select(Person.id).where(*some)
-        secrets = select(Credential.id).where(Credential.person_id.in_(gone))
-        session.execute(delete(IdempotentReply).where(IdempotentReply.credential_id.in_(secrets)))
+    enrolled_ids = select(Enrolment.person_id)
+    for start in range(0, len(person_ids), _AT_ONCE):
+        is_unenrolled = (
+            Person.id.in_(person_ids[start : start + _AT_ONCE]),
+            Person.id.not_in(enrolled_ids),
+            ~Person.operator,
+        )
+        removed_ids = select(Person.id).where(*is_unenrolled)
+        credential_ids = select(Credential.id).where(Credential.person_id.in_(removed_ids))
+        session.execute(delete(IdempotentReply).where(IdempotentReply.credential_id.in_(credential_ids)))
         for column in (Credential.person_id, LtiPerson.person_id):
-            session.execute(delete(column.class_).where(column.in_(gone)))
-        session.execute(delete(Person).where(*some))
+            session.execute(delete(column.class_).where(column.in_(removed_ids)))
+        session.execute(delete(Person).where(*is_unenrolled))
 
 
 def _sign_out_leaving(session: Session) -> None:
     """Revoke the credentials of students who leave a course, if they reach that course."""
-    reaches = or_(Credential.course_id.is_(None), Credential.course_id == Enrolment.course_id)
-    left = select(Enrolment.id).where(Enrolment.id.in_(_leaving), Enrolment.person_id == Credential.person_id, reaches)
-    ended = update(Credential).where(Credential.revoked_at.is_(None), left.exists()).values(revoked_at=now(session))
-    session.execute(ended.execution_options(synchronize_session=False))
+    has_reach = or_(Credential.course_id.is_(None), Credential.course_id == Enrolment.course_id)
+    leaving_enrolments = select(Enrolment.id).where(
+        Enrolment.id.in_(_leaving), Enrolment.person_id == Credential.person_id, has_reach
+    )
+    statement = (
+        update(Credential)
+        .where(Credential.revoked_at.is_(None), leaving_enrolments.exists())
+        .values(revoked_at=now(session))
+    )
+    session.execute(statement.execution_options(synchronize_session=False))
 
 
 def _count_rows(session: Session, table: Table) -> int:

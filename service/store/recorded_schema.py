@@ -18,8 +18,8 @@ from service.store.new_database import SCHEMA_FILE, STATEMENT_SEPARATOR
 
 def read_statements(connection: Connection) -> list[str]:
     """Return the statements that create the tables of a SQLite database, in order."""
-    asked = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY rowid"
-    return list(connection.exec_driver_sql(asked).scalars())
+    query = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY rowid"
+    return list(connection.exec_driver_sql(query).scalars())
 
 
 def write_schema() -> None:
@@ -28,8 +28,8 @@ def write_schema() -> None:
         engine = open_engine(f"sqlite:///{folder}/new.db")
         with engine.begin() as connection:
             apply_migrations(connection)
-            oldest = connection.scalar(select(SchemaCompatibility.oldest_compatible))
-            compatibility = f"INSERT INTO {SchemaCompatibility.__tablename__} VALUES (1, '{oldest}')"
+            oldest_revision = connection.scalar(select(SchemaCompatibility.oldest_compatible))
+            compatibility = f"INSERT INTO {SchemaCompatibility.__tablename__} VALUES (1, '{oldest_revision}')"
             statements = [*read_statements(connection), compatibility]
             SCHEMA_FILE.write_text(STATEMENT_SEPARATOR.join(statements) + "\n", encoding="utf-8")
         engine.dispose()

@@ -60,18 +60,18 @@ def read_revision(connection: Connection) -> str | None:
     """Return the revision of the database within the caller's transaction; None for an empty one."""
     if not inspect(connection).has_table(_TABLE):
         return None
-    found: str | None = connection.scalar(select(column("version_num")).select_from(table(_TABLE)))
-    return found
+    revision: str | None = connection.scalar(select(column("version_num")).select_from(table(_TABLE)))
+    return revision
 
 
 def load_schema_state(engine: Engine) -> SchemaState:
     """Return the revision of the database and its compatibility. Before 0017, only the same revision is compatible."""
     with engine.begin() as connection:
         revision = read_revision(connection)
-        oldest = None
+        oldest_revision = None
         if revision is not None and inspect(connection).has_table(_COMPATIBILITY.name):
-            oldest = connection.scalar(select(_COMPATIBILITY.c.oldest_compatible))
-        return SchemaState(revision, oldest or revision or "")
+            oldest_revision = connection.scalar(select(_COMPATIBILITY.c.oldest_compatible))
+        return SchemaState(revision, oldest_revision or revision or "")
 
 
 def needs_newer_code(session: Session) -> bool:

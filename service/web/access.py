@@ -87,8 +87,8 @@ def derive_csrf_token(session_secret: str) -> str:
     return _derive_key(session_secret, b"robomark csrf").hex()
 
 
-def _derive_key(session_secret: str, what: bytes) -> bytes:
-    return hmac.digest(session_secret.encode(), what, "sha256")
+def _derive_key(session_secret: str, purpose: bytes) -> bytes:
+    return hmac.digest(session_secret.encode(), purpose, "sha256")
 
 
 def find_reader(request: Request, context: Context) -> Reader | None:
@@ -111,8 +111,12 @@ def _require_sign_in(request: Request, reader: OptionalReader, context: Context)
     if reader is None:
         raise SignInNeeded("sign in first")
     context.limits.page_calls.spend(str(reader.identity.person_id))
-    needed = find_page_scope(request.method, request.scope["route"].path)
-    if reader.identity.scopes is not None and needed is not None and needed not in reader.identity.scopes:
+    required_scope = find_page_scope(request.method, request.scope["route"].path)
+    if (
+        reader.identity.scopes is not None
+        and required_scope is not None
+        and required_scope not in reader.identity.scopes
+    ):
         raise HTTPException(
             403,
             translatable("Your sign-in token does not have the scope for this action. Use another token or a link."),
@@ -137,10 +141,10 @@ async def check_same_site(request: Request, reader: OptionalReader) -> None:
         )
     if reader is None:
         return
-    word = request.headers.get(CSRF_HEADER)
-    if word is None:
-        word = str((await request.form()).get(CSRF_FIELD, ""))
-    if not secrets.compare_digest(word.encode(), reader.csrf.encode()):
+    csrf_token = request.headers.get(CSRF_HEADER)
+    if csrf_token is None:
+        csrf_token = str((await request.form()).get(CSRF_FIELD, ""))
+    if not secrets.compare_digest(csrf_token.encode(), reader.csrf.encode()):
         raise HTTPException(
             403,
             translatable(
@@ -160,9 +164,9 @@ def _is_same_origin(request: Request) -> bool:
     origin = request.headers.get("origin")
     if origin is None:
         return True
-    public = request.app.state.context.settings.public_url
-    here = request.headers.get("host", "").lower()
-    return origin.lower() in {public.lower(), f"http://{here}", f"https://{here}"} - {""}
+    public_url = request.app.state.context.settings.public_url
+    host = request.headers.get("host", "").lower()
+    return origin.lower() in {public_url.lower(), f"http://{host}", f"https://{host}"} - {""}
 
 
 def build_not_found() -> HTTPException:

@@ -67,7 +67,7 @@ def require_caller(request: Request, context: Context) -> Caller:
     return Caller(identity)
 
 
-def _require_caller(request: Request, context: Context, _told: Annotated[object, Depends(bearer)]) -> Caller:
+def _require_caller(request: Request, context: Context, _credentials: Annotated[object, Depends(bearer)]) -> Caller:
     return require_caller(request, context)
 
 
@@ -88,22 +88,22 @@ def require_scope(scope: str) -> Callable[[Caller], Caller]:
 
 def require_role(role: Role, scope: str) -> Callable[[int, Caller, Context], CallerInCourse]:
     """Return a dependency that requires a role in the path's course and a token scope."""
-    scoped = require_scope(scope)
+    require_scoped_caller = require_scope(scope)
 
     def caller_in_course(course_id: RowNumber, caller: AuthenticatedCaller, context: Context) -> CallerInCourse:
         course = courses.show_own(context.service, caller.actor, course_id, role)
-        return CallerInCourse(scoped(caller), course.id)
+        return CallerInCourse(require_scoped_caller(caller), course.id)
 
     return caller_in_course
 
 
 def require_operator(scope: str) -> Callable[[Caller], Caller]:
     """Return a dependency that requires an operator and a token scope."""
-    scoped = require_scope(scope)
+    require_scoped_caller = require_scope(scope)
 
     def operator(caller: AuthenticatedCaller) -> Caller:
         if not caller.identity.operator:
             raise build_not_found()
-        return scoped(caller)
+        return require_scoped_caller(caller)
 
     return operator

@@ -77,19 +77,21 @@ _KEY_PARAMETER = {
 def build_openapi(app: FastAPI) -> dict[str, Any]:
     """Return the OpenAPI document. It is generated once."""
     if app.openapi_schema is None:
-        found = get_openapi(title="Robomark", version=app.version, description=_DESCRIPTION.strip(), routes=app.routes)
-        schemas = found.setdefault("components", {}).setdefault("schemas", {})
+        document = get_openapi(
+            title="Robomark", version=app.version, description=_DESCRIPTION.strip(), routes=app.routes
+        )
+        schemas = document.setdefault("components", {}).setdefault("schemas", {})
         schemas["Problem"] = _PROBLEM
-        for unused in ("HTTPValidationError", "ValidationError"):
-            schemas.pop(unused, None)
-        for operations in found["paths"].values():
+        for schema_name in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(schema_name, None)
+        for operations in document["paths"].values():
             for method, operation in operations.items():
                 _add_error_responses(method, operation)
         for schema in schemas.values():
             # FastAPI omits null values, in examples too.
             for example in schema.get("examples", ()):
                 example.update({name: None for name in schema.get("required", ()) if name not in example})
-        app.openapi_schema = found
+        app.openapi_schema = document
     return app.openapi_schema
 
 

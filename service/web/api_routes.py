@@ -56,31 +56,31 @@ class Listed(BaseModel, Generic[_Item]):
 
 
 def build_list_page(
-    found: Sequence[_Item], limit: int, place: Callable[[_Item], Sequence[str | int | datetime]]
+    items: Sequence[_Item], limit: int, get_sort_key: Callable[[_Item], Sequence[str | int | datetime]]
 ) -> Listed[_Item]:
     """Return a page of a list.
 
     Args:
-        found: The items, with one more than ``limit`` if there is a next page.
+        items: The items, with one more than ``limit`` if there is a next page.
         limit: Maximum number of items on the page.
-        place: Returns the sort key of an item, which the next page starts after.
+        get_sort_key: Returns the sort key of an item, which the next page starts after.
     """
-    more = len(found) > limit
-    return Listed(items=list(found[:limit]), next=_encode_cursor(place(found[limit - 1])) if more else None)
+    has_more = len(items) > limit
+    return Listed(items=list(items[:limit]), next=_encode_cursor(get_sort_key(items[limit - 1])) if has_more else None)
 
 
-def _encode_cursor(place: Sequence[str | int | datetime]) -> str:
-    told = [part.isoformat() if isinstance(part, datetime) else part for part in place]
-    return base64.urlsafe_b64encode(json.dumps(told).encode()).decode().rstrip("=")
+def _encode_cursor(sort_key: Sequence[str | int | datetime]) -> str:
+    values = [part.isoformat() if isinstance(part, datetime) else part for part in sort_key]
+    return base64.urlsafe_b64encode(json.dumps(values).encode()).decode().rstrip("=")
 
 
-def decode_cursor(after: str, *kinds: type) -> tuple[Any, ...] | None:
+def decode_cursor(cursor: str, *kinds: type) -> tuple[Any, ...] | None:
     """Return the sort key in a cursor, or None for the first page. Raises HTTPException 422 for an invalid cursor."""
-    if not after:
+    if not cursor:
         return None
     try:
-        place = read_json(base64.b64decode(after + "=" * (-len(after) % 4), altchars=b"-_", validate=True))
-        return tuple(_parse_cursor_part(part, kind) for part, kind in zip(place, kinds, strict=True))
+        values = read_json(base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True))
+        return tuple(_parse_cursor_part(part, kind) for part, kind in zip(values, kinds, strict=True))
     except (ValueError, TypeError, OverflowError):
         raise HTTPException(422, "after: expected the `next` of the previous page.") from None
 
@@ -101,11 +101,11 @@ def _parse_cursor_part(part: object, kind: type) -> object:
 def respond_with_etag(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
     """Return the response with an entity tag, or 304 without a body if the client already has this version."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
-    told = {"etag": tag, "cache-control": "private, no-cache", **headers}
-    known = request.headers.get("if-none-match", "")
-    if tag in (part.strip().removeprefix("W/") for part in known.split(",")):
-        return Response(status_code=304, headers=told)
-    return Response(body, media_type=media_type, headers=told)
+    all_headers = {"etag": tag, "cache-control": "private, no-cache", **headers}
+    known_tags = request.headers.get("if-none-match", "")
+    if tag in (part.strip().removeprefix("W/") for part in known_tags.split(",")):
+        return Response(status_code=304, headers=all_headers)
+    return Response(body, media_type=media_type, headers=all_headers)
 
 
 class ApiRequest(Request):
@@ -126,14 +126,14 @@ class RepeatableRoute(APIRoute):
 
     def get_route_handler(self) -> Callable[[Request], Awaitable[Response]]:  # type: ignore[override]
         """Return FastAPI's handler, extended by idempotency keys."""
-        run = super().get_route_handler()
+        handle_request = super().get_route_handler()
 
         async def handler(request: Request) -> Response:
             request = ApiRequest(request.scope, request.receive)
             key = request.headers.get(KEY_HEADER)
             if key is None or request.method != "POST" or NO_KEY.keys() <= (self.openapi_extra or {}).keys():
-                return await run(request)
-            return await _run_once(request, key, run)
+                return await handle_request(request)
+            return await _run_once(request, key, handle_request)
 
         return handler
 
@@ -143,33 +143,33 @@ def api_router(tag: str) -> APIRouter:
     return APIRouter(tags=[tag], route_class=RepeatableRoute)
 
 
-async def _run_once(request: Request, key: str, run: Callable[[Request], Awaitable[Response]]) -> Response:
+async def _run_once(request: Request, key: str, handle_request: Callable[[Request], Awaitable[Response]]) -> Response:
     if not 0 < len(key) <= LONGEST_KEY or not key.isascii() or not key.isprintable():
         raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
     context: WebContext = request.app.state.context
     caller = await run_in_threadpool(require_caller, request, context)
     # The role is part of the key: after a change of role, the request runs again and is checked again.
-    mine = (context.service, caller.actor, f"{_format_role_key(request, caller.identity)} {key}")
-    hashed = _HashedRequest(request)
+    key_owner = (context.service, caller.actor, f"{_format_role_key(request, caller.identity)} {key}")
+    hashed_request = _HashedRequest(request)
     try:
-        known = await run_in_threadpool(replies.reserve_key, *mine)
+        stored_reply = await run_in_threadpool(replies.reserve_key, *key_owner)
     except InProgress:
         raise HTTPException(
             409, "The first request with this Idempotency-Key is still in progress.", {"retry-after": "5"}
         ) from None
-    if known is not None:
-        if await hashed.finish_hash() != known.request_sha256:
+    if stored_reply is not None:
+        if await hashed_request.finish_hash() != stored_reply.request_sha256:
             raise HTTPException(422, "Idempotency-Key: another request used this key; expected a new key.")
-        media_type = "application/json" if known.body else None
-        return Response(known.body, known.status, {"idempotent-replay": "true"}, media_type)
+        media_type = "application/json" if stored_reply.body else None
+        return Response(stored_reply.body, stored_reply.status, {"idempotent-replay": "true"}, media_type)
     try:
-        answer = await run(ApiRequest(request.scope, hashed.receive))
+        answer = await handle_request(ApiRequest(request.scope, hashed_request.receive))
     except BaseException:
-        await run_in_threadpool(replies.release_key, *mine)
+        await run_in_threadpool(replies.release_key, *key_owner)
         raise
-    reply = StoredReply(await hashed.finish_hash(), answer.status_code, bytes(answer.body))
+    reply = StoredReply(await hashed_request.finish_hash(), answer.status_code, bytes(answer.body))
     try:
-        await run_in_threadpool(replies.store_reply, *mine, reply)
+        await run_in_threadpool(replies.store_reply, *key_owner, reply)
     except DatabaseError as error:
         # The request has succeeded, so the client gets its response. Repetitions are rejected until the key expires.
         _log.error("web.reply_not_kept", path=request.url.path, error=str(error))

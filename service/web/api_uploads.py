@@ -68,8 +68,8 @@ async def _receive_files(request: Request) -> AsyncIterator[Sequence[UploadedFil
     if kind != _FORM:
         raise HTTPException(415, f"Expected files as {_FORM}; this is {kind[:100] or 'of no type'}.")
     async with request.form(max_files=MAX_FILES, max_fields=10) as form:
-        found = [each for each in form.getlist("files") if isinstance(each, UploadFile)]
-        yield [UploadedFile(each.filename or "", each.file) for each in found]
+        uploads = [each for each in form.getlist("files") if isinstance(each, UploadFile)]
+        yield [UploadedFile(each.filename or "", each.file) for each in uploads]
 
 
 #: The files of an uploaded form. The same order applies.

@@ -73,10 +73,10 @@ def _collect_routes() -> APIRouter:
     """Return the routes of all modules. They are cached, because creating them takes half a second."""
     all_routes = APIRouter()
     for module in pkgutil.iter_modules(pages.__path__, f"{pages.__name__}."):
-        found = importlib.import_module(module.name)
-        if router := getattr(found, "router", None):
+        page_module = importlib.import_module(module.name)
+        if router := getattr(page_module, "router", None):
             all_routes.include_router(router, dependencies=[Depends(check_same_site)], include_in_schema=False)
-        if router := getattr(found, "cross_site_router", None):
+        if router := getattr(page_module, "cross_site_router", None):
             all_routes.include_router(router, include_in_schema=False)
     for module in pkgutil.iter_modules(api.__path__, f"{api.__name__}."):
         if router := getattr(importlib.import_module(module.name), "router", None):
@@ -95,8 +95,8 @@ def _add_probes(app: FastAPI, service: Service) -> None:
         """Return 200 if submissions would be graded now, otherwise 503 with the problems."""
         findings = examine_service(service.settings, service.store)
         is_ready = all(finding.well for finding in findings)
-        checks = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
-        return JSONResponse({"ready": is_ready, "checks": checks}, status_code=200 if is_ready else 503)
+        checks_by_name = {finding.what: {"well": finding.well, "sentence": finding.sentence} for finding in findings}
+        return JSONResponse({"ready": is_ready, "checks": checks_by_name}, status_code=200 if is_ready else 503)
 
     @app.get("/metrics", include_in_schema=False)
     def metrics() -> Response:

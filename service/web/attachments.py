@@ -16,7 +16,7 @@ def respond_with_attachment(data: bytes, name: str, media_type: str = "applicati
     """Return a response that the browser saves as a file. Any ``name`` is allowed; long names are shortened."""
     suffix = PurePosixPath(name).suffix[:20]
     name = name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - len(suffix)] + suffix
-    plain = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).lstrip(".") or "file"
-    whole = quote(name.encode("utf-8", "replace"), safe="")
-    disposition = f"attachment; filename=\"{plain}\"; filename*=UTF-8''{whole}"
+    ascii_name = re.sub(r"[^\w.-]+", "_", name, flags=re.ASCII).lstrip(".") or "file"
+    quoted_name = quote(name.encode("utf-8", "replace"), safe="")
+    disposition = f"attachment; filename=\"{ascii_name}\"; filename*=UTF-8''{quoted_name}"
     return Response(data, media_type=media_type, headers={"content-disposition": disposition})

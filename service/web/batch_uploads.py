@@ -35,13 +35,13 @@ def read_upload(
         UsageError: The upload cannot be read.
         HTTPException: 503 if another upload is being read.
     """
-    asked = find_batch_assignment(context.service, actor, course_id, assignment)
+    batch_assignment = find_batch_assignment(context.service, actor, course_id, assignment)
     # One at a time, because an upload may need gigabytes of temporary disk space.
     if not context.unpacking.acquire(timeout=_UNPACKING_SECONDS):
         raise TranslatableHTTPException(
             503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
         )
     try:
-        return read_batch_for(path, asked, people)
+        return read_batch_for(path, batch_assignment, people)
     finally:
         context.unpacking.release()

@@ -29,9 +29,9 @@ class WebContext:
 
 
 def _read_context(request: Request) -> WebContext:
-    found = request.app.state.context
-    assert isinstance(found, WebContext)
-    return found
+    context = request.app.state.context
+    assert isinstance(context, WebContext)
+    return context
 
 
 Context = Annotated[WebContext, Depends(_read_context)]

@@ -45,10 +45,10 @@ def derive_secret(reader: Reader, word: str) -> str:
 
 def find_created_link(request: Request, context: WebContext, reader: Reader, word: str) -> CreatedLink | None:
     """Return the link for a word, or None if it does not exist, was used or has expired."""
-    found = sign_in_links.find_link(context.service, derive_secret(reader, word)) if word else None
-    if found is None:
+    link = sign_in_links.find_link(context.service, derive_secret(reader, word)) if word else None
+    if link is None:
         return None
-    return CreatedLink(build_sign_in_url(request, context, found.secret), found.person_id, found.name, found.expires_at)
+    return CreatedLink(build_sign_in_url(request, context, link.secret), link.person_id, link.name, link.expires_at)
 
 
 def build_sign_in_url(request: Request, context: WebContext, secret: str) -> str:

@@ -20,21 +20,21 @@ def parse_date_time(text: str) -> datetime | None:
     if not text.strip():
         return None
     try:
-        read = parse_time(text, end_of_day=True)
+        parsed_time = parse_time(text, end_of_day=True)
     except (ValueError, OverflowError):
-        read = None
-    if read is None or not 2000 <= read.year < 2200:
+        parsed_time = None
+    if parsed_time is None or not 2000 <= parsed_time.year < 2200:
         raise UsageError(f"{text[:40]!r} is not a date, expected a date like 2026-11-30 or 2026-11-30T17:00")
-    return read
+    return parsed_time
 
 
 def format_utc_offset(moment: datetime) -> str:
     """Return the server's UTC offset at a moment: ``UTC``, ``UTC+1``, ``UTC-3:30``."""
-    ahead = moment.astimezone().utcoffset() or timedelta()
-    hours, minutes = divmod(abs(ahead) // timedelta(minutes=1), 60)
+    utc_offset = moment.astimezone().utcoffset() or timedelta()
+    hours, minutes = divmod(abs(utc_offset) // timedelta(minutes=1), 60)
     if not hours and not minutes:
         return "UTC"
-    return f"UTC{'-' if ahead < timedelta() else '+'}{hours}{f':{minutes:02}' if minutes else ''}"
+    return f"UTC{'-' if utc_offset < timedelta() else '+'}{hours}{f':{minutes:02}' if minutes else ''}"
 
 
 def format_current_offset() -> str:

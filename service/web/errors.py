@@ -62,25 +62,25 @@ async def _redirect_to_sign_in(request: Request, _error: Exception) -> Response:
             401, "A token is required: Authorization: Bearer rmt_...", {"www-authenticate": "Bearer"}
         )
     target = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
-    where = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
+    sign_in_path = f"/sign-in?next={quote(target)}" if request.method == "GET" else "/sign-in"
     if request.headers.get("hx-request") == "true":
-        return Response(status_code=401, headers={"hx-redirect": where})
-    return RedirectResponse(where, 303)
+        return Response(status_code=401, headers={"hx-redirect": sign_in_path})
+    return RedirectResponse(sign_in_path, 303)
 
 
 async def _respond_to_http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    routers = _ROUTER_ERRORS.get((error.status_code, str(error.detail)))
-    said = extract_message(error) if routers is None else routers
-    return respond_with_error(request, error.status_code, said, dict(error.headers or {}))
+    router_message = _ROUTER_ERRORS.get((error.status_code, str(error.detail)))
+    message = extract_message(error) if router_message is None else router_message
+    return respond_with_error(request, error.status_code, message, dict(error.headers or {}))
 
 
 async def _respond_to_validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"][1:]) or str(first["loc"][0])
-    message = str(first["msg"])
-    return respond_with_error(request, 422, Sentence(f"{where}: {message[:1].lower()}{message[1:]}"))
+    first_error = error.errors()[0]
+    location = ".".join(str(part) for part in first_error["loc"][1:]) or str(first_error["loc"][0])
+    message = str(first_error["msg"])
+    return respond_with_error(request, 422, Sentence(f"{location}: {message[:1].lower()}{message[1:]}"))
 
 
 async def _respond_to_usage_error(request: Request, error: Exception) -> Response:
@@ -120,26 +120,28 @@ async def _respond_to_unexpected_error(request: Request, error: Exception) -> Re
 
 
 def respond_with_error(
-    request: Request, status: int, said: Sentence | RobomarkError, headers: dict[str, str] | None = None
+    request: Request, status: int, message: Sentence | RobomarkError, headers: dict[str, str] | None = None
 ) -> Response:
     """Return an error response: a page in the reader's language, or a problem in English for the API."""
-    asked_by_program = request.url.path.startswith(API_PREFIX)
-    language = ENGLISH if asked_by_program else detect_language(request)
-    sentence = language.translate_sentence(said) if isinstance(said, Sentence) else describe_error(said, language)
-    if asked_by_program:
+    is_api_request = request.url.path.startswith(API_PREFIX)
+    language = ENGLISH if is_api_request else detect_language(request)
+    sentence = (
+        language.translate_sentence(message) if isinstance(message, Sentence) else describe_error(message, language)
+    )
+    if is_api_request:
         return respond_with_problem(status, sentence, headers)
     try:
         reader = find_reader(request, request.app.state.context)
     except (RobomarkError, DatabaseError):
         reader = None
-    shown = render_page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
-    shown.headers.update(headers or {})
-    return shown
+    page = render_page(request, reader, "error.html", status_code=status, status=status, sentence=sentence)
+    page.headers.update(headers or {})
+    return page
 
 
 def describe_error(error: RobomarkError, language: Language) -> str:
     """Return the error's message as a complete sentence in this language."""
     text = language.translate_sentence(error.message)
     # A file name at the beginning is not capitalised.
-    first = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
-    return f"{first}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
+    first_letter = text[:1] if "." in text.partition(" ")[0] else text[:1].upper()
+    return f"{first_letter}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"

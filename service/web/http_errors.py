@@ -12,9 +12,9 @@ from sim.sentences import Sentence
 class TranslatableHTTPException(HTTPException):
     """An ``HTTPException`` with a translatable message. ``detail`` contains the English text."""
 
-    def __init__(self, status: int, said: Sentence, headers: Mapping[str, str] | None = None) -> None:
-        super().__init__(status, str(said), headers)
-        self.message = said
+    def __init__(self, status: int, message: Sentence, headers: Mapping[str, str] | None = None) -> None:
+        super().__init__(status, str(message), headers)
+        self.message = message
 
 
 def extract_message(error: HTTPException) -> Sentence:

@@ -12,10 +12,12 @@ COOKIE = "language"
 
 def detect_language(request: Request) -> Language:
     """Return the language that the reader chose, else the one that the browser prefers, else English."""
-    chosen = request.cookies.get(COOKIE, "")
-    if chosen in list_languages():
-        return load_language(chosen)
-    asked = [part.split(";")[0].strip() for part in request.headers.get("accept-language", "")[:200].split(",")]
+    chosen_code = request.cookies.get(COOKIE, "")
+    if chosen_code in list_languages():
+        return load_language(chosen_code)
+    accepted_codes = [
+        part.split(";")[0].strip() for part in request.headers.get("accept-language", "")[:200].split(",")
+    ]
     return load_language(
-        negotiate_locale([code for code in asked if code], list(list_languages()), sep="-") or SOURCE_LANGUAGE
+        negotiate_locale([code for code in accepted_codes if code], list(list_languages()), sep="-") or SOURCE_LANGUAGE
     )

@@ -17,13 +17,13 @@ def listen(host: str, port: int) -> socket.socket:
     """Return a listening socket. Port 0 selects a free port. Raises UsageError if the address is not available."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with ExitStack() as on_failure:
-            listening = on_failure.enter_context(socket.socket(family, kind, protocol))
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listening.bind(address)
-            listening.listen(128)
-            on_failure.pop_all()
-            return listening
+        with ExitStack() as exit_stack:
+            listener = exit_stack.enter_context(socket.socket(family, kind, protocol))
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind(address)
+            listener.listen(128)
+            exit_stack.pop_all()
+            return listener
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UsageError(f"cannot listen on {host}:{port}: {reason}; choose another with --port or --host") from None
@@ -32,10 +32,10 @@ def listen(host: str, port: int) -> socket.socket:
 def check_reach(host: str, settings: Settings) -> None:
     """Raise UsageError if other machines can reach the server and no public URL is set."""
     try:
-        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+        addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except OSError:
         return
-    if settings.public_url or all(ip_address(str(each[4][0]).partition("%")[0]).is_loopback for each in found):
+    if settings.public_url or all(ip_address(str(each[4][0]).partition("%")[0]).is_loopback for each in addresses):
         return
     raise UsageError(
         f"--host {host} makes this server reachable from other machines, but it does not support TLS: run it behind a "
@@ -43,7 +43,7 @@ def check_reach(host: str, settings: Settings) -> None:
     )
 
 
-def format_address(listening: socket.socket) -> str:
+def format_address(listener: socket.socket) -> str:
     """Return the URL of the server for browsers."""
-    host, port = listening.getsockname()[:2]
+    host, port = listener.getsockname()[:2]
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

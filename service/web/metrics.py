@@ -52,29 +52,29 @@ def _collect_queue_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
             open_jobs.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
     yield open_jobs
     depth = GaugeMetricFamily("robomark_queue_depth", "Jobs that a worker could begin now.", labels=["lane"])
-    oldest = GaugeMetricFamily(
+    oldest_seconds = GaugeMetricFamily(
         "robomark_queue_oldest_seconds",
         "How long the oldest job that a worker could begin has waited.",
         labels=["lane"],
     )
     for lane in JobQueue:
         depth.add_metric([lane.value], metrics.queue.claimable.get(lane, 0))
-        oldest.add_metric([lane.value], metrics.queue.oldest_seconds.get(lane, 0.0))
+        oldest_seconds.add_metric([lane.value], metrics.queue.oldest_seconds.get(lane, 0.0))
     yield depth
-    yield oldest
+    yield oldest_seconds
     plots = GaugeMetricFamily("robomark_plots", "Grades by the state of their plots.", labels=["state"])
-    for plotted in (PlotState.DUE, PlotState.DONE, PlotState.FAILED):
-        plots.add_metric([plotted.value], metrics.plots.get(plotted, 0))
+    for plot_state in (PlotState.DUE, PlotState.DONE, PlotState.FAILED):
+        plots.add_metric([plot_state.value], metrics.plots.get(plot_state, 0))
     yield plots
     yield GaugeMetricFamily("robomark_batches_paused", "Batches that are held back.", metrics.paused_batches)
 
 
 def _collect_outcome_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
-    ended = CounterMetricFamily("robomark_jobs_ended", "Jobs that have ended.", labels=["lane", "state"])
+    ended_jobs = CounterMetricFamily("robomark_jobs_ended", "Jobs that have ended.", labels=["lane", "state"])
     for lane in JobQueue:
         for state in _ENDED:
-            ended.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
-    yield ended
+            ended_jobs.add_metric([lane.value, state.value], metrics.queue.jobs.get((lane, state), 0))
+    yield ended_jobs
     verdicts = CounterMetricFamily("robomark_verdicts", "Grades by verdict.", labels=["verdict"])
     for verdict, count in sorted(metrics.verdicts.items()):
         verdicts.add_metric([verdict], count)
@@ -91,24 +91,26 @@ def _collect_outcome_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
 
 
 def _collect_worker_metrics(metrics: ServiceMetrics) -> Iterator[Metric]:
-    lately = [seen for seen in metrics.queue.workers if seen.lately]
-    yield GaugeMetricFamily("robomark_workers", "Workers heard of in the last 30 s.", len(lately))
+    live_workers = [seen for seen in metrics.queue.workers if seen.lately]
+    yield GaugeMetricFamily("robomark_workers", "Workers heard of in the last 30 s.", len(live_workers))
     yield GaugeMetricFamily(
         "robomark_workers_quarantined", "Workers that got a known answer wrong.", metrics.quarantined
     )
-    silent = GaugeMetricFamily(
+    silent_seconds = GaugeMetricFamily(
         "robomark_worker_silent_seconds", "Since the worker was last heard of.", labels=["worker", "host", "version"]
     )
     slots = GaugeMetricFamily("robomark_worker_slots", "Gradings at a time.", labels=["worker", "host"])
-    for seen in metrics.queue.workers:
-        worker = seen.worker
-        silent.add_metric([worker.name, worker.host, worker.grader_version], metrics.queue.silent_seconds[worker.name])
+    for line in metrics.queue.workers:
+        worker = line.worker
+        silent_seconds.add_metric(
+            [worker.name, worker.host, worker.grader_version], metrics.queue.silent_seconds[worker.name]
+        )
         slots.add_metric([worker.name, worker.host], worker.concurrency)
-    yield silent
+    yield silent_seconds
     yield slots
-    build = GaugeMetricFamily("robomark_build", "What answers here; always 1.", labels=["grader_version"])
-    build.add_metric([GRADER_VERSION], 1)
-    yield build
+    build_info = GaugeMetricFamily("robomark_build", "What answers here; always 1.", labels=["grader_version"])
+    build_info.add_metric([GRADER_VERSION], 1)
+    yield build_info
 
 
 def _collect_phase_times(metrics: ServiceMetrics) -> Iterator[Metric]:

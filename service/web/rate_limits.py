@@ -25,26 +25,26 @@ class RateLimit:
         self._lock = threading.Lock()
         self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # calls left, and the time of that count
 
-    def spend(self, who: str) -> None:
-        """Count one call of ``who``. Raises HTTPException 429 with ``Retry-After`` if the bucket is empty."""
+    def spend(self, client_key: str) -> None:
+        """Count one call of ``client_key``. Raises HTTPException 429 with ``Retry-After`` if the bucket is empty."""
         with self._lock:
-            left, at = self._compute_left(who)
-            self._left.pop(who, None)
-            self._left[who] = (max(0.0, left - 1), at)
+            remaining, current_time = self._compute_left(client_key)
+            self._left.pop(client_key, None)
+            self._left[client_key] = (max(0.0, remaining - 1), current_time)
             if len(self._left) > _MOST_KNOWN:
                 self._left.popitem(last=False)
-        if left < 1:
-            self._refuse(left)
+        if remaining < 1:
+            self._refuse(remaining)
 
-    def _compute_left(self, who: str) -> tuple[float, float]:
-        at = self._clock()
-        left, since = self._left.get(who, (self._burst, at))
-        return min(self._burst, left + (at - since) * self._per_second), at
+    def _compute_left(self, client_key: str) -> tuple[float, float]:
+        current_time = self._clock()
+        remaining, last_time = self._left.get(client_key, (self._burst, current_time))
+        return min(self._burst, remaining + (current_time - last_time) * self._per_second), current_time
 
-    def _refuse(self, left: float) -> NoReturn:
-        seconds = max(1, round((1 - left) / self._per_second))
-        said = Sentence("Too many requests. Try again in %(seconds)s s.", {"seconds": seconds})
-        raise TranslatableHTTPException(429, said, {"retry-after": str(seconds)})
+    def _refuse(self, remaining: float) -> NoReturn:
+        seconds = max(1, round((1 - remaining) / self._per_second))
+        message = Sentence("Too many requests. Try again in %(seconds)s s.", {"seconds": seconds})
+        raise TranslatableHTTPException(429, message, {"retry-after": str(seconds)})
 
 
 @dataclass(frozen=True, slots=True)

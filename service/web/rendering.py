@@ -31,7 +31,7 @@ def render_page(
 ) -> HTMLResponse:
     """Render a template as a page. ``reader`` is None for readers who are not signed in."""
     language = detect_language(request)
-    told = {
+    variables = {
         "request": request,
         "reader": reader,
         "language": language.code,
@@ -40,7 +40,7 @@ def render_page(
         "Role": Role,
         **context,
     }
-    return HTMLResponse(_build_environment(language).get_template(template).render(told), status_code=status_code)
+    return HTMLResponse(_build_environment(language).get_template(template).render(variables), status_code=status_code)
 
 
 def is_htmx_request(request: Request) -> bool:
@@ -59,12 +59,12 @@ def load_static_files() -> Mapping[str, tuple[str, bytes]]:
         "robomark.js": web.joinpath("robomark.js").read_text(encoding="utf-8"),
     }
     types = {"js": "text/javascript; charset=utf-8", "css": "text/css; charset=utf-8"}
-    named = {}
+    files_by_name = {}
     for name, text in contents.items():
         stem, kind = name.rsplit(".", 1)
         data = text.encode()
-        named[f"{stem}.{hashlib.sha256(data).hexdigest()[:12]}.{kind}"] = (types[kind], data)
-    return MappingProxyType(named)
+        files_by_name[f"{stem}.{hashlib.sha256(data).hexdigest()[:12]}.{kind}"] = (types[kind], data)
+    return MappingProxyType(files_by_name)
 
 
 @lru_cache(maxsize=1)
@@ -111,9 +111,11 @@ def _format_moment(value: datetime | None) -> Markup | str:
     """Return a ``time`` element with the moment in the server's time zone."""
     if value is None:
         return "–"
-    here = value.astimezone()
-    shown = Markup('{} <span class="zone">{}</span>').format(f"{here:%Y-%m-%d %H:%M}", format_utc_offset(here))
-    return Markup('<time datetime="{}">{}</time>').format(here.isoformat(), shown)
+    local_time = value.astimezone()
+    text = Markup('{} <span class="zone">{}</span>').format(
+        f"{local_time:%Y-%m-%d %H:%M}", format_utc_offset(local_time)
+    )
+    return Markup('<time datetime="{}">{}</time>').format(local_time.isoformat(), text)
 
 
 def _format_typed_text(text: str) -> Markup:

@@ -43,8 +43,8 @@ _Endpoint = TypeVar("_Endpoint", bound=Callable[..., object])
 class BodyTooLarge(TranslatableHTTPException):
     """The request body is too large."""
 
-    def __init__(self, most: int) -> None:
-        amount = f"{most // MEGABYTE} MB" if most >= MEGABYTE else f"{most // 1024} kB"
+    def __init__(self, max_bytes: int) -> None:
+        amount = f"{max_bytes // MEGABYTE} MB" if max_bytes >= MEGABYTE else f"{max_bytes // 1024} kB"
         super().__init__(413, Sentence("The request is too large. The limit is %(limit)s.", {"limit": amount}))
 
 
@@ -56,11 +56,11 @@ class UploadLimit:
     role: Role
 
 
-def takes_upload(most: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
-    """Declare that an endpoint accepts bodies of up to ``most`` bytes. All others accept ``LARGEST_FORM``."""
+def takes_upload(max_bytes: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
+    """Declare that an endpoint accepts bodies of up to ``max_bytes`` bytes. All others accept ``LARGEST_FORM``."""
 
     def declared(endpoint: _Endpoint) -> _Endpoint:
-        setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(most, role))
+        setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(max_bytes, role))
         return endpoint
 
     return declared
@@ -86,22 +86,22 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, send)
             return
         upload, course = self._find_upload(scope)
-        most = LARGEST_FORM if upload is None else upload.most
+        max_bytes = LARGEST_FORM if upload is None else upload.most
         if scope["path"] in _PUBLIC_PATHS:
-            most = _LARGEST_PUBLIC_BODY
+            max_bytes = _LARGEST_PUBLIC_BODY
         request = Request(scope, receive)
         try:
             if scope["method"] not in _BODILESS_METHODS and scope["path"] not in _PUBLIC_PATHS:
                 await run_in_threadpool(_check_sender, request, upload, course)
             _check_charset(request.headers)
-            _check_length(request.headers, most)
+            _check_length(request.headers, max_bytes)
         except Exception as error:
             handlers = scope["app"].exception_handlers
             handler = next(handlers[kind] for kind in type(error).__mro__ if kind in handlers)
             answer = await handler(request, error)
             await answer(scope, receive, send)
             return
-        await self._app(scope, _limit_body(receive, most), send)
+        await self._app(scope, _limit_body(receive, max_bytes), send)
 
     def _find_upload(self, scope: Scope) -> tuple[UploadLimit | None, str]:
         """Return the upload that the request's route declares, and the course id in the path."""
@@ -112,8 +112,8 @@ class BodyLimitMiddleware:
                 if (upload := getattr(route.endpoint, _UPLOAD_ATTRIBUTE, None)) is not None and route.path is not None
             )
         for route in self._uploads:
-            if scope["method"] in route.methods and (found := route.path.match(scope["path"])):
-                return route.upload, found["course_id"]
+            if scope["method"] in route.methods and (match := route.path.match(scope["path"])):
+                return route.upload, match["course_id"]
         return None, ""
 
 
@@ -139,10 +139,10 @@ def _find_identity(request: Request) -> Identity | None:
     return sign_in.identify(context.service, secret, kind)
 
 
-def _check_length(headers: Headers, most: int) -> None:
+def _check_length(headers: Headers, max_bytes: int) -> None:
     length = headers.get("content-length", "0")
-    if not length.isdecimal() or len(length) > 18 or int(length) > most:
-        raise BodyTooLarge(most)
+    if not length.isdecimal() or len(length) > 18 or int(length) > max_bytes:
+        raise BodyTooLarge(max_bytes)
 
 
 def _check_charset(headers: Headers) -> None:
@@ -156,16 +156,16 @@ def _check_charset(headers: Headers) -> None:
         raise TranslatableHTTPException(415, Sentence("Forms are read in UTF-8 only."))
 
 
-def _limit_body(receive: Receive, most: int) -> Receive:
-    """Wrap ``receive`` and raise TooMuch when the body exceeds ``most`` bytes."""
+def _limit_body(receive: Receive, max_bytes: int) -> Receive:
+    """Wrap ``receive`` and raise TooMuch when the body exceeds ``max_bytes`` bytes."""
     so_far = 0
 
     async def counted() -> Message:
         nonlocal so_far
         message = await receive()
         so_far += len(message.get("body", b""))
-        if so_far > most:
-            raise BodyTooLarge(most)
+        if so_far > max_bytes:
+            raise BodyTooLarge(max_bytes)
         return message
 
     return counted

@@ -109,5 +109,5 @@ def _is_address(host: str) -> bool:
 
 def _parse_host(header: str) -> str:
     """Return the host name of a Host header without the port."""
-    found = _NAME_AND_PORT.fullmatch(header)
-    return (found[1] or header if found else header).lower()
+    match = _NAME_AND_PORT.fullmatch(header)
+    return (match[1] or header if match else header).lower()

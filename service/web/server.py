@@ -23,7 +23,7 @@ from service.webhook_sender import WebhookSender
 from sim.processes import leave_current_folder
 
 
-def serve_on(settings: Settings, listening: socket.socket) -> None:
+def serve_on(settings: Settings, listener: socket.socket) -> None:
     """Serve until stopped, with temporary uploads in a folder of this process.
 
     Raises:
@@ -37,7 +37,7 @@ def serve_on(settings: Settings, listening: socket.socket) -> None:
     with own_temporary_folder(), open_store(settings) as store:
         config = build_server_config(settings, make_app(settings, store))
         with WebhookSender(store, ALL_NETWORKS if settings.webhooks_inside else NO_NETWORKS):
-            uvicorn.Server(config).run(sockets=[listening])
+            uvicorn.Server(config).run(sockets=[listener])
 
 
 def build_server_config(settings: Settings, application: ASGIApp) -> uvicorn.Config:

@@ -19,9 +19,9 @@ def submit(context: WebContext, actor: Actor, course_id: int, request: Submissio
 
 
 def start_test_run(
-    context: WebContext, actor: Actor, course_id: int, assignment: str, sent: Sequence[UploadedFile]
+    context: WebContext, actor: Actor, course_id: int, assignment: str, files: Sequence[UploadedFile]
 ) -> str:
     """Start a test run. Raises HTTPException 429 above the rate limit, and the errors of ``test_runs.start``."""
     submissions.load_submission_target(context.service, actor, course_id, assignment)
     context.limits.test_runs.spend(str(actor.person_id))
-    return test_runs.start(context.service, actor, course_id, assignment, sent)
+    return test_runs.start(context.service, actor, course_id, assignment, files)

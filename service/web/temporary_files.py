@@ -23,15 +23,15 @@ def own_temporary_folder() -> Iterator[Path]:
     """Use a separate folder for all temporary files of this process, and remove folders left by other processes."""
     remove_left_overs(_PREFIX)
     _remove_old_folders()
-    before = tempfile.gettempdir()
-    folder, lock = create_locked_folder(_PREFIX, 0o700)
+    previous_folder = tempfile.gettempdir()
+    folder, lock_descriptor = create_locked_folder(_PREFIX, 0o700)
     tempfile.tempdir = str(folder)
     try:
         yield folder
     finally:
-        tempfile.tempdir = before
+        tempfile.tempdir = previous_folder
         shutil.rmtree(folder, ignore_errors=True)
-        os.close(lock)
+        os.close(lock_descriptor)
 
 
 def _remove_old_folders() -> None:
@@ -39,6 +39,6 @@ def _remove_old_folders() -> None:
         for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
             # Another server may be removing the same folder.
             with contextlib.suppress(OSError):
-                about = folder.lstat()
-                if about.st_uid == os.getuid() and about.st_mtime < time.time() - _OLD_SECONDS:
+                status = folder.lstat()
+                if status.st_uid == os.getuid() and status.st_mtime < time.time() - _OLD_SECONDS:
                     shutil.rmtree(folder, ignore_errors=True)

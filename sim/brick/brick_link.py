@@ -96,9 +96,9 @@ class Link:
         self._wire, self._stuck, self._tick, self._place = wire, stuck, tick, place
         start = 0
         for index, (name, width) in enumerate(sensors.items()):
-            where = slice(start, start + width) if width else start
+            selector = slice(start, start + width) if width else start
             for times in (1, 2):
-                self._sensors[name, times] = _pack(_READ, index, 0, 0, times), times * READ, where
+                self._sensors[name, times] = _pack(_READ, index, 0, 0, times), times * READ, selector
             start += width or 1
 
     def notify(self, frame: Frame) -> None:
@@ -119,11 +119,17 @@ class Link:
             )
         if polarity is not None:
             self._wire.send_later({"do": "polarity", "port": port, "polarity": polarity})
-        part, left = _PORTS[port], len(set_points)
+        part, remaining = _PORTS[port], len(set_points)
         for name, value in set_points.items():
-            left -= 1
+            remaining -= 1
             self._wire.act_later(
-                _pack(_MOTOR, part, _SET_POINTS[name], 0 if left else _COMMANDS[command], clamp_to_finite(name, value))
+                _pack(
+                    _MOTOR,
+                    part,
+                    _SET_POINTS[name],
+                    0 if remaining else _COMMANDS[command],
+                    clamp_to_finite(name, value),
+                )
             )
         if not set_points and command is not None:
             self._wire.act_later(_pack(_MOTOR, part, 0, _COMMANDS[command], 0))
@@ -157,10 +163,10 @@ class Link:
     def _receive_answer(self) -> Any:
         answer = self._wire.receive()
         self.units = answer["t"]
-        arrived = answer.get("m")
-        if arrived:
+        message = answer.get("m")
+        if message:
             # New messages go into a new dictionary, so that a dictionary returned earlier does not change.
-            self.state = {"messages": [*self.state["messages"], *arrived]}
+            self.state = {"messages": [*self.state["messages"], *message]}
         return answer.get("v")
 
     def read(self, what: str, times: int) -> Any:
@@ -169,10 +175,10 @@ class Link:
         Values change only at ticks. If the reading ends before the next tick, the value is already known. The world
         then gets a notification instead of a question, and counts the time by the same rule.
         """
-        packed, lasts, where = self._sensors[what, times]
+        packed, duration, selector = self._sensors[what, times]
         self._free = 0
         self._send_place()
-        end = self.units + lasts
+        end = self.units + duration
         if end < self._seen_until:
             self.units = end
             self._wire.act_later(packed)
@@ -180,7 +186,7 @@ class Link:
             self._wire.act(packed)
             self._seen = self._receive_answer()
             self._seen_until = (self.ticks + 1) * self._tick
-        return self._seen[where]
+        return self._seen[selector]
 
     @property
     def ticks(self) -> int:

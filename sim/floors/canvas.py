@@ -56,8 +56,8 @@ class SmoothCanvas:
 
     def line(self, points: Sequence[Point], width: float, colour: Colour = BLACK) -> None:
         """Draw a line ``width`` pixels wide through the points, with round joins."""
-        scaled = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
-        self._canvas.line(scaled, colour, width=round(width * SCALE), joint="curve")
+        scaled_points = [(round(x * SCALE), round(y * SCALE)) for x, y in points]
+        self._canvas.line(scaled_points, colour, width=round(width * SCALE), joint="curve")
 
     def capsule(self, start: Point, end: Point, radius: float, colour: Colour) -> None:
         """Fill the area within ``radius`` of the line from ``start`` to ``end``."""

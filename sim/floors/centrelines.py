@@ -22,12 +22,12 @@ _TEST_LINES = ("141", "440", "771", "1076", "1453-high", "1453", "1821", "1821-h
 def load_centrelines() -> Mapping[str, tuple[Point, ...]]:
     """Return all centrelines by name: ``Line_Following_Test/141`` ..., and ``Thruxton_Circuit`` (clockwise, closed)."""
     test = load_track_lines("line_following_test.json")
-    found = {
+    centrelines = {
         f"Line_Following_Test/{name}": _orient_upwards(line) for name, line in zip(_TEST_LINES, test, strict=False)
     }
     (circuit,) = load_track_lines("thruxton_circuit.json")
-    found["Thruxton_Circuit"] = tuple((x, HEIGHT - y) for x, y in circuit.points)
-    return MappingProxyType(found)
+    centrelines["Thruxton_Circuit"] = tuple((x, HEIGHT - y) for x, y in circuit.points)
+    return MappingProxyType(centrelines)
 
 
 def _orient_upwards(line: TrackLine) -> tuple[Point, ...]:
@@ -35,11 +35,11 @@ def _orient_upwards(line: TrackLine) -> tuple[Point, ...]:
     points = [(x, HEIGHT - y) for x, y in line.points]
     if points[0][1] > points[-1][1]:
         points.reverse()
-    kept: list[Point] = []
-    for before, after in itertools.pairwise(points):
-        kept.append(before)
-        if after[1] > HEIGHT:
-            share = (HEIGHT - before[1]) / (after[1] - before[1])
-            kept.append((before[0] + share * (after[0] - before[0]), float(HEIGHT)))
-            return tuple(kept)
-    return (*kept, points[-1])
+    clipped_points: list[Point] = []
+    for start, end in itertools.pairwise(points):
+        clipped_points.append(start)
+        if end[1] > HEIGHT:
+            share = (HEIGHT - start[1]) / (end[1] - start[1])
+            clipped_points.append((start[0] + share * (end[0] - start[0]), float(HEIGHT)))
+            return tuple(clipped_points)
+    return (*clipped_points, points[-1])

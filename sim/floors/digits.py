@@ -53,16 +53,16 @@ def draw_black_sheet(seed: int, *, label_patches: bool) -> tuple[Pixels, tuple[F
 
 def _draw_sheet(seed: int, paper: int, *, label_patches: bool) -> tuple[Pixels, tuple[FloorLabel, ...]]:
     """Return sheet ``seed`` on paper of grey ``paper``. Each position shows any of the 1000 images, equally likely."""
-    images, shown = load_sheet_digits()
+    images, image_digits = load_sheet_digits()
     chance = RandomStream(seed, "digit sheet")
     level = np.full((HEIGHT, WIDTH), paper, dtype=np.uint8)
     labels = []
-    for place in range(COLUMNS * ROWS):
-        row, column = divmod(place, COLUMNS)
-        chosen = chance.integer(place) % len(images)
-        digit = int(shown[chosen])
+    for cell in range(COLUMNS * ROWS):
+        row, column = divmod(cell, COLUMNS)
+        image_index = chance.integer(cell) % len(images)
+        digit = int(image_digits[image_index])
         labels.append(_build_label(digit, column, row))
-        _paste_piece(level, images[chosen], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
+        _paste_piece(level, images[image_index], DIGIT_LEFT + PITCH * column, DIGIT_TOP + PITCH * row)
         if label_patches:
             patch = np.full((PATCH_HEIGHT, PATCH_WIDTH), GREY_STEP * digit, dtype=np.uint8)
             _paste_piece(level, patch, PATCH_LEFT + PITCH * column, PATCH_TOP + PITCH * row)
@@ -82,5 +82,5 @@ def _paste_piece(level: NDArray[np.uint8], piece: NDArray[np.uint8], left: int, 
 @functools.cache
 def load_sheet_digits() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the images for sheets, shape (1000, 14, 14), and their digits, shape (1000,)."""
-    with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as packed:
-        return packed["images"], packed["labels"]
+    with resources.files(__package__).joinpath("digits_14x14.npz").open("rb") as stream, np.load(stream) as archive:
+        return archive["images"], archive["labels"]

@@ -78,8 +78,8 @@ def draw_fll_2018() -> Pixels:
 def _draw_stars(canvas: SmoothCanvas) -> None:
     chance = RandomStream(2018, "stars")
     for star in range(160):
-        place = (chance.between(0, WIDTH, star, 0), chance.between(0, HEIGHT, star, 1))
-        canvas.disc(place, chance.between(1, 3, star, 2), make_grey(150 + chance.integer(star, 3) % 90))
+        centre = (chance.between(0, WIDTH, star, 0), chance.between(0, HEIGHT, star, 1))
+        canvas.disc(centre, chance.between(1, 3, star, 2), make_grey(150 + chance.integer(star, 3) % 90))
 
 
 def _draw_asteroid(canvas: SmoothCanvas) -> None:

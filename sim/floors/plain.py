@@ -161,33 +161,38 @@ def draw_linear_grey() -> Pixels:
 @register_floor("Radial_grey", Pose(100, 400, 0), menu=6)
 def draw_radial_grey() -> Pixels:
     """Draw a radial gradient from white in the middle to black at the corners."""
-    return _draw_radial_gradient(inner=WHITE, outer=BLACK)
+    return _draw_radial_gradient(inner_colour=WHITE, outer_colour=BLACK)
 
 
 @register_floor("Radial_red", Pose(100, 400, 0), menu=7)
 def draw_radial_red() -> Pixels:
     """Draw a radial gradient from light red in the middle to dark red at the corners."""
-    return _draw_radial_gradient(inner=(255, 80, 80), outer=(80, 0, 0))
+    return _draw_radial_gradient(inner_colour=(255, 80, 80), outer_colour=(80, 0, 0))
 
 
-def _draw_radial_gradient(inner: Colour, outer: Colour) -> Pixels:
-    """Draw a gradient from ``inner`` at (1181, 571.5) to ``outer``: the cube root of distance / (sqrt(2) * 1181).
+def _draw_radial_gradient(inner_colour: Colour, outer_colour: Colour) -> Pixels:
+    """Draw a gradient from ``inner_colour`` at (1181, 571.5) to ``outer_colour``.
+
+    The shade is the cube root of distance / (sqrt(2) * 1181).
 
     The levels decrease with the distance, so the code computes the distance at which each level ends. Colours then
     don't depend on a vectorised power function, which may differ between processors.
     """
     x = 2 * np.arange(WIDTH, dtype=np.int64) - 2362
     y = 2 * np.arange(HEIGHT, dtype=np.int64) - 1143
-    quarters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, an integer
-    channels = [_compute_radial_channel(quarters, low, high) for low, high in zip(outer, inner, strict=True)]
+    squared_diameters = x[None, :] ** 2 + y[:, None] ** 2  # four times the squared distance, an integer
+    channels = [
+        _compute_radial_channel(squared_diameters, low, high)
+        for low, high in zip(outer_colour, inner_colour, strict=True)
+    ]
     return np.stack(channels, axis=2)
 
 
-def _compute_radial_channel(quarters: NDArray[np.int64], outer: int, inner: int) -> Pixels:
+def _compute_radial_channel(squared_diameters: NDArray[np.int64], outer_level: int, inner_level: int) -> Pixels:
     def darkness(quarter: int) -> int:
         t = (math.sqrt(quarter) / 2 / (math.sqrt(2) * 1181)) ** (1 / 3)
-        return inner - int(outer * t + inner * (1 - t))
+        return inner_level - int(outer_level * t + inner_level * (1 - t))
 
-    furthest = range(int(quarters.max()) + 1)
-    starts = [bisect_left(furthest, step, key=darkness) for step in range(1, inner - outer + 1)]
-    return (inner - np.searchsorted(starts, quarters, side="right")).astype(np.uint8)
+    furthest = range(int(squared_diameters.max()) + 1)
+    starts = [bisect_left(furthest, step, key=darkness) for step in range(1, inner_level - outer_level + 1)]
+    return (inner_level - np.searchsorted(starts, squared_diameters, side="right")).astype(np.uint8)

@@ -110,8 +110,8 @@ def register_floor(
         def drawing(_seed: int, *, label_patches: bool) -> Drawing:
             return (draw if label_patches or unlabelled is None else unlabelled)(), labels
 
-        named = tuple(dict.fromkeys(label.label for label in labels))
-        _register(_FloorDefinition(name, pose, menu, named, obstacles, False, drawing))
+        label_names = tuple(dict.fromkeys(label.label for label in labels))
+        _register(_FloorDefinition(name, pose, menu, label_names, obstacles, False, drawing))
         return draw
 
     return register
@@ -169,8 +169,8 @@ def _build_seeded_floor(name: str, labels: bool, seed: int) -> Floor:
 
 
 def _draw_floor(plan: _FloorDefinition, labels: bool, seed: int) -> Floor:
-    pixels, found = plan.draw(seed, label_patches=labels)
-    return Floor(plan.name, _make_read_only(pixels), plan.pose, found, plan.obstacles, labels, seed)
+    pixels, floor_labels = plan.draw(seed, label_patches=labels)
+    return Floor(plan.name, _make_read_only(pixels), plan.pose, floor_labels, plan.obstacles, labels, seed)
 
 
 def get_floor_start(name: str) -> tuple[Pose, tuple[Obstacle, ...]]:
@@ -217,13 +217,13 @@ def _get_definition(name: str) -> _FloorDefinition:
 def _suggest_floors(name: str) -> str:
     """Return the end of an error message that suggests floors similar to ``name``, or lists all floors."""
     by_lower = {known.lower(): known for known in list_floor_names()}
-    near = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
-    if near:
-        return "did you mean " + " or ".join(by_lower[match] for match in near) + "?"
+    matches = difflib.get_close_matches(name.lower(), by_lower, n=3, cutoff=0.5)
+    if matches:
+        return "did you mean " + " or ".join(by_lower[match] for match in matches) + "?"
     return "there are " + ", ".join(list_floor_names()) + "."
 
 
 def _make_read_only(pixels: Pixels) -> Pixels:
-    fixed = np.ascontiguousarray(pixels)
-    fixed.setflags(write=False)
-    return fixed
+    contiguous_pixels = np.ascontiguousarray(pixels)
+    contiguous_pixels.setflags(write=False)
+    return contiguous_pixels

@@ -61,5 +61,5 @@ def _draw_stripes(canvas: SmoothCanvas, left: float, right: float, top: float, b
     for index, width in enumerate((20, 16, 12, 8, 4)):
         start = left + group * index
         for stripe in range(int(group / width / 2)):
-            near = start + 2 * width * stripe
-            canvas.rectangle((near, top, near + width, bottom), BLACK)
+            stripe_left = start + 2 * width * stripe
+            canvas.rectangle((stripe_left, top, stripe_left + width, bottom), BLACK)

@@ -54,8 +54,8 @@ def draw_obstacles_test() -> Pixels:
     lines = load_track_lines("obstacles_test.json")
     for line in lines:
         canvas.line(line.points, line.width)
-    first, last = 63.0, 1097.0
-    canvas.rectangle((1036, first, 1334, last), BLACK)
+    top, bottom = 63.0, 1097.0
+    canvas.rectangle((1036, top, 1334, bottom), BLACK)
     return canvas.to_pixels()
 
 
@@ -81,10 +81,10 @@ def draw_junction_handling_test() -> Pixels:
         (0, 1, "right"), (0, 2, "right"), (1, 0, "left"), (1, 1, "right"), (1, 2, "left"), (2, 0, "right"),
         (2, 2, "right"), (3, 2, "left"), (4, 1, "left"),
     ):  # fmt: skip
-        near = columns[column] + sides[side] * width / 2
-        far = near + sides[side] * marker
+        inner_edge = columns[column] + sides[side] * width / 2
+        outer_edge = inner_edge + sides[side] * marker
         bottom = rows[row] + width / 2  # behind the crossing, seen by a robot that comes from below
-        canvas.rectangle((min(near, far), bottom, max(near, far), bottom + marker), green)
+        canvas.rectangle((min(inner_edge, outer_edge), bottom, max(inner_edge, outer_edge), bottom + marker), green)
     return canvas.to_pixels()
 
 
@@ -120,12 +120,12 @@ class LocalFrame:
 
     def map_rectangle(self, along: tuple[float, float], across: tuple[float, float]) -> tuple[Point, ...]:
         """Return the four corners of a rectangle, in order, given its ranges along and across the axis in pixels."""
-        (near, far), (top, bottom) = along, across
+        (start, end), (top, bottom) = along, across
         return (
-            self.map_point(near, top),
-            self.map_point(far, top),
-            self.map_point(far, bottom),
-            self.map_point(near, bottom),
+            self.map_point(start, top),
+            self.map_point(end, top),
+            self.map_point(end, bottom),
+            self.map_point(start, bottom),
         )
 
 

@@ -47,25 +47,25 @@ def read_records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
         Unreadable: There are too many cells.
     """
     _check_cell_count(sum(line.count(separator) for line in lines) + len(lines))
-    begun = 0
+    record_start = 0
 
-    def following(start: int) -> Iterator[str]:
+    def iterate_lines(start: int) -> Iterator[str]:
         for number in range(start, len(lines)):
-            if number - begun >= MOST_LINES_OF_RECORD:
+            if number - record_start >= MOST_LINES_OF_RECORD:
                 raise csv.Error("a row spans too many lines")
             yield lines[number]
 
-    while begun < len(lines):
-        start = begun
-        reader = csv.reader(following(start), delimiter=separator, strict=True)
+    while record_start < len(lines):
+        start = record_start
+        reader = csv.reader(iterate_lines(start), delimiter=separator, strict=True)
         try:
             for cells in reader:
-                yield CsvRecord(begun + 1, cells)
-                begun = start + reader.line_num
+                yield CsvRecord(record_start + 1, cells)
+                record_start = start + reader.line_num
             return
         except csv.Error:
-            yield CsvRecord(begun + 1, (), broken=True)
-            begun += 1
+            yield CsvRecord(record_start + 1, (), broken=True)
+            record_start += 1
 
 
 def _check_cell_count(cells: int) -> None:

@@ -57,19 +57,19 @@ def _check_numbers(value: object) -> None:
     """Raise Unreadable for a number beyond TOML's 64 bits. Python cannot print numbers with thousands of digits."""
     if isinstance(value, int) and value.bit_length() > 64:
         raise UnreadableDataError("it has a number that is too long")
-    for each in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        _check_numbers(each)
+    for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _check_numbers(item)
 
 
-def _make_placeholder(found: re.Match[str]) -> str:
-    return "" if found[0].startswith("#") else "x"
+def _make_placeholder(match: re.Match[str]) -> str:
+    return "" if match[0].startswith("#") else "x"
 
 
 def _check_structure(structure: str) -> None:
     check_depth(structure)
     parts = 0
-    for dotted in _DOTTED.finditer(structure):
-        dots = dotted[0].count(".")
+    for dotted_key in _DOTTED.finditer(structure):
+        dots = dotted_key[0].count(".")
         if dots >= MOST_KEY_PARTS:
             raise UnreadableDataError("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
         # One dot can be a decimal point.

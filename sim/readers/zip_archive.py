@@ -82,9 +82,9 @@ def read_entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
 def _count_entries(source: BinaryIO) -> int:
     """Return an upper bound for the number of entries: the number of entry signatures in the data."""
     source.seek(0)
-    count, before = 0, b""
+    count, tail = 0, b""
     while chunk := source.read(1 << 20):
-        count += (before + chunk).count(_ENTRY)
-        before = chunk[-3:]
+        count += (tail + chunk).count(_ENTRY)
+        tail = chunk[-3:]
     source.seek(0)
     return count

@@ -53,8 +53,8 @@ class AssignmentOverview:
 
     def matches_text(self, text: str) -> bool:
         """Return whether the overview contains every word of the text, ignoring case."""
-        told = f"{self.section} {self.id} {self.title} {self.sentence} {TOPICS.get(self.topic, '')}".casefold()
-        return all(word in told for word in text.casefold().split())
+        searched_text = f"{self.section} {self.id} {self.title} {self.sentence} {TOPICS.get(self.topic, '')}".casefold()
+        return all(word in searched_text for word in text.casefold().split())
 
 
 def read_overview(folder: Path) -> AssignmentOverview:
@@ -76,16 +76,16 @@ def _choose_sentence(description: str) -> str:
     A sentence that begins with "Write" takes precedence.
     """
     sentences = _SENTENCE_ENDS.split(" ".join(description.split()))
-    asking = (each for each in sentences if each.startswith("Write "))
-    others = (each for each in sentences if not _START_POSE_SENTENCE.match(each))
-    return textwrap.shorten(next(asking, next(others, sentences[0])), _LONGEST_SENTENCE, placeholder=" …")
+    instructions = (each for each in sentences if each.startswith("Write "))
+    candidates = (each for each in sentences if not _START_POSE_SENTENCE.match(each))
+    return textwrap.shorten(next(instructions, next(candidates, sentences[0])), _LONGEST_SENTENCE, placeholder=" …")
 
 
 def _count_trials(scenario: Mapping[str, Any]) -> int:
     """Return the number of trials: poses x swept levels x noise levels x seeds."""
     poses = 1 if scenario.get("choose") == "random" else len(scenario["poses"])
-    swept = sum(map(len, scenario.get("sweep", {}).values())) or 1
+    sweep_levels = sum(map(len, scenario.get("sweep", {}).values())) or 1
     noises = [scenario.get(name, 0) for name in ("light_noise", "motor_noise")]
-    light, motor = (len(levels) if isinstance(levels, list) else 1 for levels in noises)
-    trials: int = poses * swept * light * motor * scenario.get("trials", 1)
+    light_levels, motor_levels = (len(levels) if isinstance(levels, list) else 1 for levels in noises)
+    trials: int = poses * sweep_levels * light_levels * motor_levels * scenario.get("trials", 1)
     return trials

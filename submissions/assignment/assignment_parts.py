@@ -66,9 +66,10 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         return None
     for key in document:
         if key not in _HEAD and key not in _TABLES:
-            known = (*_HEAD, *_TABLES)
+            known_keys = (*_HEAD, *_TABLES)
             problems.add(
-                (key,), f'"{key[:60]}" is not a key here, expected {join_with_or(known)}{suggest_name(key, known)}'
+                (key,),
+                f'"{key[:60]}" is not a key here, expected {join_with_or(known_keys)}{suggest_name(key, known_keys)}',
             )
     head = check_table(HeadTable, {k: v for k, v in document.items() if k in _HEAD}, (), problems)
     world_table = check_table(WorldTable, document.get("world", {}), ("world",), problems)
@@ -76,13 +77,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     limits = check_table(LimitsTable, document.get("limits", {}), ("limits",), problems)
     ground = _load_floor(world_table or _read_background_only(document), files, problems)
     world = _build_world(world_table, ground, files, problems) if world_table and ground else None
-    robotless = _runs_no_robot(document)
-    scenarios = [] if robotless else _build_scenarios(document, ground, problems)
+    is_robotless = _runs_no_robot(document)
+    scenarios = [] if is_robotless else _build_scenarios(document, ground, problems)
     if world_table and parts:
         check_robots(document, world_table, parts, problems)
     agents, agents_sources = read_agents(document, parts, files, problems)
     _check_beacons(scenarios, world, problems)
-    around = AssignmentContext(
+    context = AssignmentContext(
         scenarios=[scenario for scenario in scenarios if scenario],
         ground=ground,
         without=_find_absent_parts(parts),
@@ -91,16 +92,16 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         files=files,
         aliases=head.aliases if head else {},
     )
-    criteria = read_criteria(document, around, robotless, problems)
+    criteria = read_criteria(document, context, is_robotless, problems)
     training = None
     if "training" in document:
         training_table = check_table(TrainingTable, document["training"], ("training",), problems)
         training = _build_training(training_table, scenarios, ground, problems) if training_table else None
     check_given_files(document, problems)
     given_parts = read_check_sources(criteria, files, problems)
-    given_parts |= _read_given_parts(parts, robotless, files, problems) if parts else {}
+    given_parts |= _read_given_parts(parts, is_robotless, files, problems) if parts else {}
     given_parts |= agents_sources
-    given = _collect_given_files(document, files, problems)
+    given_files = _collect_given_files(document, files, problems)
     if problems.found or not (head and world and parts and limits):
         return None
     assignment = Assignment(
@@ -119,9 +120,11 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         limits=Limits(**limits.model_dump()),
         section=head.section,
         description=head.description,
-        given=MappingProxyType(given),
+        given=MappingProxyType(given_files),
         given_parts=MappingProxyType(given_parts),
-        version=_compute_version(files, given, {name: text for name, text in given_parts.items() if name not in files}),
+        version=_compute_version(
+            files, given_files, {name: text for name, text in given_parts.items() if name not in files}
+        ),
         training=training,
         secret=head.secret,
     )
@@ -131,24 +134,26 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     return assignment
 
 
-def _check_lengths(value: object, place: Place, problems: Problems) -> None:
+def _check_lengths(value: object, table_path: Place, problems: Problems) -> None:
     """Report lists and tables that are too long; comparing their entries would take minutes."""
     if not isinstance(value, list | dict):
         return
-    most = _MAX_TABLES if isinstance(value, list) and any(isinstance(entry, dict) for entry in value) else _MAX_ENTRIES
-    if len(value) > most:
-        name = ".".join(str(part) for part in place)[:60] or "the file"
-        problems.add(place, f"{name} has {len(value)} entries, expected at most {most}")
+    maximum = (
+        _MAX_TABLES if isinstance(value, list) and any(isinstance(entry, dict) for entry in value) else _MAX_ENTRIES
+    )
+    if len(value) > maximum:
+        name = ".".join(str(part) for part in table_path)[:60] or "the file"
+        problems.add(table_path, f"{name} has {len(value)} entries, expected at most {maximum}")
         return
     for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
-        _check_lengths(entry, (*place, key), problems)
+        _check_lengths(entry, (*table_path, key), problems)
 
 
-def _compute_version(files: Files, given: Files, packaged: Mapping[str, str]) -> str:
+def _compute_version(files: Files, given_files: Files, packaged: Mapping[str, str]) -> str:
     """Return the SHA-256 over names and bytes, sorted by name. Packaged networks and responders count as files."""
     digest = hashlib.sha256()
     responders = {name: text.encode() for name, text in packaged.items()}
-    for kind, group in (("file", files), ("given", given), ("responder", responders)):
+    for kind, group in (("file", files), ("given", given_files), ("responder", responders)):
         for name in sorted(group):
             digest.update(f"{kind}:{len(name.encode())}:{name}:{len(group[name])}:".encode() + group[name])
     return digest.hexdigest()
@@ -163,21 +168,21 @@ def _read_background_only(document: Mapping[str, object]) -> WorldTable:
 
 def _load_floor(table: WorldTable, files: Files, problems: Problems) -> Floor | None:
     name = table.background
-    place = ("world", "background")
+    key_path = ("world", "background")
     try:
         if name in list_floor_names():
             return build_floor(name, labels=table.labels)
         if name.lower().endswith(_IMAGE_SUFFIXES) and name in files:
             return build_floor_from_image(name, files[name])
     except UsageError as error:
-        problems.add(place, f"{str(error).rstrip('.')}, expected an image that can be used")
+        problems.add(key_path, f"{str(error).rstrip('.')}, expected an image that can be used")
         return None
     if name.lower().endswith(_IMAGE_SUFFIXES):
-        problems.add(place, f'background is "{name[:60]}", expected an image beside this file')
+        problems.add(key_path, f'background is "{name[:60]}", expected an image beside this file')
         return None
     hint = suggest_name(name, list_floor_names()) or f"; there are {', '.join(list_floor_names())}"
     problems.add(
-        place, f'background is "{name[:60]}", expected a background or an image (.png, .jpg) beside this file{hint}'
+        key_path, f'background is "{name[:60]}", expected a background or an image (.png, .jpg) beside this file{hint}'
     )
     return None
 
@@ -185,8 +190,8 @@ def _load_floor(table: WorldTable, files: Files, problems: Problems) -> Floor | 
 def _build_world(table: WorldTable, ground: Floor, files: Files, problems: Problems) -> WorldSpec:
     name = table.background
     if "sheet" in table.model_fields_set and name not in list_seeded_floor_names():
-        seeded = join_with_or(list_seeded_floor_names())
-        problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {seeded}")
+        seeded_floors = join_with_or(list_seeded_floor_names())
+        problems.add(("world", "sheet"), f"{name} is not drawn from a seed, expected sheet only with {seeded_floors}")
     obstacles = table.obstacles if "obstacles" in table.model_fields_set else ground.obstacles
     for number, (x, y, width, height) in enumerate(obstacles):
         if width <= 0 or height <= 0 or not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
@@ -221,28 +226,30 @@ def _build_scenarios(
     document: Mapping[str, object], ground: Floor | None, problems: Problems
 ) -> Sequence[Scenario | None]:
     tables = read_tables(document, "scenario", problems)
-    seen: dict[str, int] = {}
+    id_counts: dict[str, int] = {}
     scenarios = []
     for number, raw in enumerate(tables):
-        place = ("scenario", number)
-        table = check_table(ScenarioTable, raw, place, problems)
-        check_unique_id(raw, seen, place, "scenario", problems)
-        scenarios.append(_build_scenario(table, ground, place, problems) if table else None)
+        table_path = ("scenario", number)
+        table = check_table(ScenarioTable, raw, table_path, problems)
+        check_unique_id(raw, id_counts, table_path, "scenario", problems)
+        scenarios.append(_build_scenario(table, ground, table_path, problems) if table else None)
     return scenarios
 
 
-def _build_scenario(table: ScenarioTable, ground: Floor | None, place: Place, problems: Problems) -> Scenario | None:
+def _build_scenario(
+    table: ScenarioTable, ground: Floor | None, table_path: Place, problems: Problems
+) -> Scenario | None:
     for key in ("poses", "second_poses"):
         for number, (x, y, _) in enumerate(getattr(table, key)):
             if not (0 <= x <= WIDTH and 0 <= y <= HEIGHT):
                 problems.add(
-                    (*place, key, number),
+                    (*table_path, key, number),
                     f"{key}[{number}] is off the floor, expected x from 0 to {WIDTH} and y from 0 to {HEIGHT}",
                 )
     poses = tuple(Pose(*pose) for pose in table.poses)
     if not poses:
         poses = (ground.default_pose if ground else Pose(100, 800, 0),)
-    second_poses = build_second_poses(table, len(poses), place, problems)
+    second_poses = build_second_poses(table, len(poses), table_path, problems)
     return Scenario(
         id=table.id,
         poses=poses,
@@ -273,7 +280,7 @@ def _find_absent_parts(parts: PartsTable | None) -> frozenset[str]:
     return frozenset(part for part in ("program", "responder") if parts and getattr(parts, part) == "none")
 
 
-def _read_given_parts(parts: PartsTable, robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
+def _read_given_parts(parts: PartsTable, is_robotless: bool, files: Files, problems: Problems) -> dict[str, str]:
     sources = {}
     for part in ("program", "responder", "second_program"):
         name = getattr(parts, part)
@@ -283,16 +290,19 @@ def _read_given_parts(parts: PartsTable, robotless: bool, files: Files, problems
             sources[name] = library.source(name)
             continue
         if name not in files or not name.endswith(".py"):
-            none = {"program": "", "second_program": f', "{SAME}"'}.get(part, f', "none", {", ".join(library.names())}')
+            alternatives = {"program": "", "second_program": f', "{SAME}"'}.get(
+                part, f', "none", {", ".join(library.names())}'
+            )
             problems.add(
-                ("parts", part), f'{part} is "{name[:60]}", expected "student"{none} or a .py file beside this file'
+                ("parts", part),
+                f'{part} is "{name[:60]}", expected "student"{alternatives} or a .py file beside this file',
             )
             continue
         try:
             sources[name] = decode_source(files[name], name).text
         except UsageError as error:
             problems.add(("parts", part), str(error).rstrip("."))
-    if parts.program == "none" and not robotless:
+    if parts.program == "none" and not is_robotless:
         problems.add(
             ("parts", "program"), 'program is "none", expected "student" or a .py file: a trial runs a program'
         )
@@ -300,33 +310,35 @@ def _read_given_parts(parts: PartsTable, robotless: bool, files: Files, problems
 
 
 def _collect_given_files(document: Mapping[str, object], files: Files, problems: Problems) -> dict[str, bytes]:
-    given = {}
+    given_files = {}
     for number, name in enumerate(filter_texts(document.get("given"))):
         if name in files and "/" not in name:
-            given[name] = files[name]
+            given_files[name] = files[name]
         else:
             problems.add(("given", number), f'given names "{name[:60]}", expected a file beside this file')
     models = document.get("given_models")
     for name, model in models.items() if isinstance(models, dict) else ():
         if not isinstance(model, str):
             continue
-        place = ("given_models", name)
+        key_path = ("given_models", name)
         data = load_packaged_model(model)
         if not re.fullmatch(r"[\w][\w.-]*", name):
-            problems.add(place, f'given_models has the file name "{name[:60]}", expected letters, digits, ., - and _')
-        elif name in given:
-            problems.add(place, f'"{name}" is given twice, expected it in given or in given_models')
-        elif data is None:
-            known = list_packaged_models()
             problems.add(
-                place,
+                key_path, f'given_models has the file name "{name[:60]}", expected letters, digits, ., - and _'
+            )
+        elif name in given_files:
+            problems.add(key_path, f'"{name}" is given twice, expected it in given or in given_models')
+        elif data is None:
+            packaged_names = list_packaged_models()
+            problems.add(
+                key_path,
                 f'"{model[:60]}" is not a packaged model, expected '
-                f"{join_with_or(known) if known else 'one (there are none)'}"
-                f"{suggest_name(model, known)}",
+                f"{join_with_or(packaged_names) if packaged_names else 'one (there are none)'}"
+                f"{suggest_name(model, packaged_names)}",
             )
         else:
-            given[name] = data
-    return given
+            given_files[name] = data
+    return given_files
 
 
 def list_packaged_models() -> tuple[str, ...]:
@@ -352,9 +364,9 @@ def _build_training(
 ) -> Training:
     """Return the training table. Report missing scenarios for training or for tests, and a floor without labels."""
     ids = [scenario.id for scenario in scenarios if scenario is not None]
-    hidden = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
+    hidden_ids = [scenario.id for scenario in scenarios if scenario is not None and scenario.visibility != "visible"]
     for number, name in enumerate(table.scenarios):
-        if name in hidden:
+        if name in hidden_ids:
             sentence = f'scenarios names "{name[:60]}", which is not visible, expected a visible scenario'
             problems.add(("training", "scenarios", number), sentence)
         if name not in ids:

@@ -29,34 +29,37 @@ _WITHOUT_ROBOT = tuple(check for check, schema in SCHEMAS.items() if not schema.
 
 
 def read_criteria(
-    document: Mapping[str, object], around: AssignmentContext, robotless: bool, problems: Problems
+    document: Mapping[str, object], context: AssignmentContext, is_robotless: bool, problems: Problems
 ) -> tuple[Criterion, ...]:
-    """Return the criteria without mistakes; ``robotless`` marks an assignment in which no robot drives."""
-    read: dict[Place, Criterion] = {}
-    seen: dict[str, int] = {}
+    """Return the criteria without mistakes; ``is_robotless`` marks an assignment in which no robot drives."""
+    criteria: dict[Place, Criterion] = {}
+    id_counts: dict[str, int] = {}
     scenarios = filter_texts([raw.get("id") for raw in filter_tables(document.get("scenario"))])
     for number, raw in enumerate(read_tables(document, "criterion", problems)):
-        place: Place = ("criterion", number)
-        criterion = _build_criterion(raw, place, problems)
+        table_path: Place = ("criterion", number)
+        criterion = _build_criterion(raw, table_path, problems)
         for index, name in enumerate(filter_texts(raw.get("scenarios"))):
             if name not in scenarios:
                 problems.add(
-                    (*place, "scenarios", index),
+                    (*table_path, "scenarios", index),
                     f'scenarios names "{name[:60]}", expected the id of a scenario{suggest_name(name, scenarios)}',
                 )
         if criterion is None:
             continue
         try:
-            criterion = criterion.complete_from(around)
-        except UnmetRequirement as misfit:
-            problems.add((*place, misfit.key), misfit.sentence)
-        check_unique_id({"id": criterion.id}, seen, place, "criterion", problems)
-        read[place] = criterion
-    around = replace(around, criteria=tuple(read.values()))
-    for place, criterion in read.items():
-        for found in (*_find_missing_parts(criterion, around, robotless), *criterion.find_unmet_requirements(around)):
-            problems.add((*place, found.key), found.sentence)
-    return tuple(read.values())
+            criterion = criterion.complete_from(context)
+        except UnmetRequirement as requirement_error:
+            problems.add((*table_path, requirement_error.key), requirement_error.sentence)
+        check_unique_id({"id": criterion.id}, id_counts, table_path, "criterion", problems)
+        criteria[table_path] = criterion
+    context = replace(context, criteria=tuple(criteria.values()))
+    for table_path, criterion in criteria.items():
+        for requirement in (
+            *_find_missing_parts(criterion, context, is_robotless),
+            *criterion.find_unmet_requirements(context),
+        ):
+            problems.add((*table_path, requirement.key), requirement.sentence)
+    return tuple(criteria.values())
 
 
 def check_given_files(document: Mapping[str, object], problems: Problems) -> None:
@@ -86,18 +89,18 @@ def read_check_sources(criteria: Iterable[Criterion], files: Mapping[str, bytes]
     return sources
 
 
-def _build_criterion(raw: Mapping[str, Any], place: Place, problems: Problems) -> Criterion | None:
+def _build_criterion(raw: Mapping[str, Any], table_path: Place, problems: Problems) -> Criterion | None:
     check = raw.get("check")
     if not isinstance(check, str) or check not in SCHEMAS:
         hint = suggest_name(check, SCHEMAS) if isinstance(check, str) else ""
-        said = f'check is "{str(check)[:60]}"' if "check" in raw else "check is missing"
-        problems.add((*place, "check"), f"{said}, expected {join_with_or(SCHEMAS)}{hint}")
+        statement = f'check is "{str(check)[:60]}"' if "check" in raw else "check is missing"
+        problems.add((*table_path, "check"), f"{statement}, expected {join_with_or(SCHEMAS)}{hint}")
         return None
     schema = SCHEMAS[check]
-    criterion = check_table(schema, raw, place, problems)
+    criterion = check_table(schema, raw, table_path, problems)
     for key in sorted(_find_marked_keys(schema, NOT_EMPTY)):
         if raw.get(key) == []:
-            problems.add((*place, key), f"{key} is an empty list and has no condition, expected at least one text")
+            problems.add((*table_path, key), f"{key} is an empty list and has no condition, expected at least one text")
     return criterion and criterion.model_copy(update={"id": criterion.id or _make_slug(criterion.title)})
 
 
@@ -105,15 +108,17 @@ def _find_marked_keys(schema: type[Criterion], mark: str) -> set[str]:
     return {name for name, key in schema.model_fields.items() if mark in key.metadata}
 
 
-def _find_missing_parts(criterion: Criterion, around: AssignmentContext, robotless: bool) -> Iterator[UnmetRequirement]:
+def _find_missing_parts(
+    criterion: Criterion, context: AssignmentContext, is_robotless: bool
+) -> Iterator[UnmetRequirement]:
     """Yield the parts that the criterion needs and the assignment lacks: a run, a second robot or a responder."""
-    if criterion.robot > around.robots:
+    if criterion.robot > context.robots:
         yield UnmetRequirement("robot", "robot is 2, but there is only one robot, expected robots = 2 in world")
     if criterion.robot > 1 and not criterion.judges_runs:
         yield UnmetRequirement("robot", "robot is 2, but check uses no run, expected it without robot")
-    if criterion.asks_responder and "responder" in around.without:
+    if criterion.asks_responder and "responder" in context.without:
         yield UnmetRequirement("check", 'check needs a responder, but parts has responder = "none", expected one')
-    if robotless and criterion.judges_runs:
+    if is_robotless and criterion.judges_runs:
         yield UnmetRequirement(
             "check",
             'check judges a run of the robot, but there is no scenario and parts has program = "none", '
@@ -122,5 +127,5 @@ def _find_missing_parts(criterion: Criterion, around: AssignmentContext, robotle
 
 
 def _make_slug(title: str) -> str:
-    words = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:60].strip("-")
-    return words or "criterion"
+    slug = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:60].strip("-")
+    return slug or "criterion"

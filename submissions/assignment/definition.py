@@ -157,26 +157,30 @@ class Assignment:
                     scenario.motor_noise,
                 )
             )
-            repeated = (level for level in levels for _ in range(scenario.trials))
-            for index, (fixed, sweep, light_noise, motor_noise) in enumerate(repeated):
+            repeated_levels = (level for level in levels for _ in range(scenario.trials))
+            for index, (fixed_index, sweep, light_noise, motor_noise) in enumerate(repeated_levels):
                 seed = self.seed(scenario, index, secret)
-                place = RandomStream(seed, "start pose").integer(0) % len(scenario.poses) if fixed is None else fixed
-                varied = dict(sweep)
+                pose_index = (
+                    RandomStream(seed, "start pose").integer(0) % len(scenario.poses)
+                    if fixed_index is None
+                    else fixed_index
+                )
+                sweep_values = dict(sweep)
                 yield Trial(
                     scenario,
                     index,
-                    _compute_start_pose(scenario, place, varied, seed),
-                    varied.get("light_noise", light_noise),
-                    varied.get("motor_noise", motor_noise),
+                    _compute_start_pose(scenario, pose_index, sweep_values, seed),
+                    sweep_values.get("light_noise", light_noise),
+                    sweep_values.get("motor_noise", motor_noise),
                     seed,
-                    place,
+                    pose_index,
                     replace(
                         scenario.channel,
-                        loss=varied.get("loss", scenario.channel.loss),
-                        delay=varied.get("delay", scenario.channel.delay),
+                        loss=sweep_values.get("loss", scenario.channel.loss),
+                        delay=sweep_values.get("delay", scenario.channel.delay),
                     ),
                     sweep,
-                    _apply_offsets(scenario, scenario.second_poses[place], seed, "second start jitter")
+                    _apply_offsets(scenario, scenario.second_poses[pose_index], seed, "second start jitter")
                     if scenario.second_poses
                     else None,
                 )
@@ -195,23 +199,23 @@ class Assignment:
 
     def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC_SECRET) -> int:
         """Return the seed of a trial's world, the same for every student."""
-        own = "" if scenario.visibility == "visible" else self.secret
-        return compute_world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{own}")
+        assignment_secret = "" if scenario.visibility == "visible" else self.secret
+        return compute_world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{assignment_secret}")
 
 
-def _compute_start_pose(scenario: Scenario, place: int, varied: Mapping[str, float], seed: int) -> Pose:
+def _compute_start_pose(scenario: Scenario, pose_index: int, sweep_values: Mapping[str, float], seed: int) -> Pose:
     """Return the pose with this number, with the swept offsets and the trial's jitter applied."""
-    offsets = [varied.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
-    return _apply_offsets(scenario, scenario.poses[place], seed, "start jitter", offsets)
+    offsets = [sweep_values.get(name, 0.0) for name in ("offset_x", "offset_y", "heading")]
+    return _apply_offsets(scenario, scenario.poses[pose_index], seed, "start jitter", offsets)
 
 
 def _apply_offsets(
-    scenario: Scenario, pose: Pose, seed: int, chance: str, by: Sequence[float] = (0.0, 0.0, 0.0)
+    scenario: Scenario, pose: Pose, seed: int, chance: str, base_offsets: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> Pose:
     """Return the pose with offsets and with the jitter drawn from this random stream."""
-    offsets = list(by)
+    offsets = list(base_offsets)
     if any(scenario.start_jitter):
         stream = RandomStream(seed, chance)
-        for axis, most in enumerate(scenario.start_jitter):
-            offsets[axis] += stream.between(-most, most, 0, axis)
+        for axis, maximum in enumerate(scenario.start_jitter):
+            offsets[axis] += stream.between(-maximum, maximum, 0, axis)
     return Pose(pose.x + offsets[0], pose.y + offsets[1], pose.heading + offsets[2])

@@ -84,18 +84,18 @@ def read_expected(assignment: str) -> ExpectedResults:
     path = locate_assignment_folder(assignment) / EXPECTED
     if not path.is_file():
         return ExpectedResults(examples={})
-    where = f"{path.parent.name}/{path.name}"
+    source_name = f"{path.parent.name}/{path.name}"
     try:
-        text, document = parse_toml(path.read_bytes(), where)
+        text, document = parse_toml(path.read_bytes(), source_name)
         original = document.pop("original", [])
         return ExpectedResults.model_validate({"examples": document, "original": original})
     except ValidationError as error:
-        problems = Problems(where, find_lines(text))
+        problems = Problems(source_name, find_lines(text))
         for details in error.errors(include_url=False):
-            part, which, *rest = (*details["loc"], "", "")
-            schema, place = (OriginalMeasure, (part, which)) if part == "original" else (ExpectedResult, (which,))
-            problem = describe_problem(schema, {**details, "loc": tuple(each for each in rest if each != "")})
-            problems.add((*place, *problem.path), problem.sentence)
+            part, key, *key_path = (*details["loc"], "", "")
+            schema, table_path = (OriginalMeasure, (part, key)) if part == "original" else (ExpectedResult, (key,))
+            problem = describe_problem(schema, {**details, "loc": tuple(each for each in key_path if each != "")})
+            problems.add((*table_path, *problem.path), problem.sentence)
         raise AssignmentProblems(problems.sorted()) from error
 
 
@@ -106,14 +106,14 @@ def read_example(assignment: str, name: str) -> Submission:
         UsageError: As for ``read_submission``.
         AssignmentProblems: As for ``expected``.
     """
-    asked = find_assignment(assignment).parts
+    required_parts = find_assignment(assignment).parts
     folder = locate_examples(assignment)
-    wanted = read_expected(assignment).examples.get(name)
-    if wanted is None or not wanted.like:
-        return read_submission(folder / name, asked=asked)
-    shared, own = read_folder(folder / wanted.like), read_folder(folder / name)
-    files = RawFiles({**shared.files, **own.files}, (*shared.notes, *own.notes))
-    return build_submission(files, name, name, EXAMPLES, asked)
+    expected = read_expected(assignment).examples.get(name)
+    if expected is None or not expected.like:
+        return read_submission(folder / name, required_parts=required_parts)
+    shared_files, own_files = read_folder(folder / expected.like), read_folder(folder / name)
+    files = RawFiles({**shared_files.files, **own_files.files}, (*shared_files.notes, *own_files.notes))
+    return build_submission(files, name, name, EXAMPLES, required_parts)
 
 
 def add_expected(assignment: str, new: Mapping[str, ExpectedResult]) -> Path:
@@ -124,25 +124,25 @@ def add_expected(assignment: str, new: Mapping[str, ExpectedResult]) -> Path:
     Raises:
         UsageError: An example has a table already.
     """
-    known = read_expected(assignment).examples
-    again = [name for name in new if name in known]
-    if again:
-        raise UsageError(f"{again[0]} has a table in {EXPECTED} already, expected an example without one.")
+    known_results = read_expected(assignment).examples
+    repeated_names = [name for name in new if name in known_results]
+    if repeated_names:
+        raise UsageError(f"{repeated_names[0]} has a table in {EXPECTED} already, expected an example without one.")
     path = locate_assignment_folder(assignment) / EXPECTED
-    before = path.read_text(encoding="utf-8").rstrip() if path.is_file() else ""
+    old_text = path.read_text(encoding="utf-8").rstrip() if path.is_file() else ""
     tables = [_format_table(name, wanted) for name, wanted in new.items()]
-    path.write_text("\n\n".join(filter(None, (before, *tables))) + "\n", encoding="utf-8")
+    path.write_text("\n\n".join(filter(None, (old_text, *tables))) + "\n", encoding="utf-8")
     return path
 
 
-def _format_table(name: str, wanted: ExpectedResult) -> str:
-    lines = [f"[{_format_key(name)}]", f'marks = "{wanted.marks}"']
-    if wanted.verdict is not Verdict.FINISHED:
-        lines.append(f'verdict = "{wanted.verdict}"')
-    lines.append(f"loses = [{', '.join(map(_quote_text, wanted.loses or ()))}]")
-    if wanted.earns:
-        earned = ", ".join(f'{_format_key(each)} = "{marks}"' for each, marks in wanted.earns.items())
-        lines.append(f"earns = {{ {earned} }}")
+def _format_table(name: str, expected: ExpectedResult) -> str:
+    lines = [f"[{_format_key(name)}]", f'marks = "{expected.marks}"']
+    if expected.verdict is not Verdict.FINISHED:
+        lines.append(f'verdict = "{expected.verdict}"')
+    lines.append(f"loses = [{', '.join(map(_quote_text, expected.loses or ()))}]")
+    if expected.earns:
+        earned_marks = ", ".join(f'{_format_key(each)} = "{marks}"' for each, marks in expected.earns.items())
+        lines.append(f"earns = {{ {earned_marks} }}")
     return "\n".join(lines)
 
 

@@ -23,8 +23,8 @@ _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)
 _SLUG = re.compile(r"[a-z0-9][a-z0-9_-]{0,79}")
 
 
-def create_assignment(folder: Path, like: str | None = None) -> None:
-    """Create ``folder`` from the commented template, or from the assignment ``like``, with a new id.
+def create_assignment(folder: Path, model: str | None = None) -> None:
+    """Create ``folder`` from the commented template, or from the assignment ``model``, with a new id.
 
     Raises:
         UsageError: The folder exists or cannot be created, or its name is not a valid id.
@@ -34,7 +34,7 @@ def create_assignment(folder: Path, like: str | None = None) -> None:
         raise UsageError(
             f'"{name}" cannot be the id of an assignment, expected small letters, digits, - and _, such as my-task'
         )
-    source = locate_assignment_folder(like) if like is not None else _locate_template()
+    source = locate_assignment_folder(model) if model is not None else _locate_template()
     read_assignment(source)
     files = _read_files(source)
     text = files[FILE_NAME].decode("utf-8")
@@ -75,10 +75,10 @@ def export_for_students(assignment: str, target: Path) -> int:
         UsageError: The folder cannot be written.
     """
     source = locate_assignment_folder(assignment)
-    found = read_assignment(source)
+    definition = read_assignment(source)
     prefix = "starter/"
     starter = {name.removeprefix(prefix): data for name, data in _read_files(source).items() if name.startswith(prefix)}
-    sheet = build_task_sheet(found)
+    sheet = build_task_sheet(definition)
     return _write_files(target, {**sheet.given, **starter, "README.md": _render_task(sheet).encode()})
 
 
@@ -110,12 +110,12 @@ def _write_files(target: Path, files: Mapping[str, bytes]) -> int:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".robomark-") as scratch:
-            made = Path(scratch) / "made"
+            staging_path = Path(scratch) / "made"
             if target.suffix.lower() == ".zip":
-                _write_zip(made, files)
+                _write_zip(staging_path, files)
             else:
-                _write_folder(made, files)
-            made.rename(target)
+                _write_folder(staging_path, files)
+            staging_path.rename(target)
     except OSError as error:
         raise UsageError(f"{target} cannot be written: {error.strerror}") from error
     return len(files)

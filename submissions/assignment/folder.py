@@ -30,9 +30,9 @@ def locate_assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     """
     name = os.fspath(name_or_path)
     path = Path(name)
-    own = _locate_catalogue() / name
-    if path.name == name and (own / FILE_NAME).is_file():
-        return own
+    catalogue_folder = _locate_catalogue() / name
+    if path.name == name and (catalogue_folder / FILE_NAME).is_file():
+        return catalogue_folder
     if path.name == FILE_NAME and path.is_file():
         path = path.parent
     if path.is_dir():

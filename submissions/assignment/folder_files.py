@@ -19,12 +19,12 @@ def walk_files(folder: Path) -> Iterator[tuple[tuple[str, ...], Path]]:
     Raises:
         AssignmentProblems: A link leads out of the folder. Its author could read files of whoever uses the assignment.
     """
-    inside = folder.resolve()
+    root = folder.resolve()
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         if any(part.startswith(".") or part == "__pycache__" for part in parts):
             continue
-        if path.is_symlink() and not path.resolve().is_relative_to(inside):
+        if path.is_symlink() and not path.resolve().is_relative_to(root):
             raise AssignmentProblems((f"{path}: is a link that leads out of the folder, expected the file itself",))
         if path.is_file():
             yield parts, path

@@ -37,17 +37,17 @@ def read_agents(
         _check_parts(table, parts, problems)
     givers: dict[str, str] = {}
     sources: dict[str, str] = {}
-    for name, who in sorted(table.items()):
-        place = ("agents", name)
+    for name, giver in sorted(table.items()):
+        key_path = ("agents", name)
         if not _NAME.fullmatch(name) or name in _RESERVED_NAMES or keyword.iskeyword(name) or hasattr(builtins, name):
-            problems.add(place, f'"{name[:60]}" cannot be the name of an agent, expected one like parser or logger')
-        elif who != "student" and (not isinstance(who, str) or who not in files or not who.endswith(".py")):
-            shown = f'"{who[:60]}"' if isinstance(who, str) else "no text"
-            problems.add(place, f'{name} is {shown}, expected "student" or a .py file beside this file')
+            problems.add(key_path, f'"{name[:60]}" cannot be the name of an agent, expected one like parser or logger')
+        elif giver != "student" and (not isinstance(giver, str) or giver not in files or not giver.endswith(".py")):
+            description = f'"{giver[:60]}"' if isinstance(giver, str) else "no text"
+            problems.add(key_path, f'{name} is {description}, expected "student" or a .py file beside this file')
         else:
-            givers[name] = who
-            if who != "student":
-                sources |= _read_source(who, files, place, problems)
+            givers[name] = giver
+            if giver != "student":
+                sources |= _read_source(giver, files, key_path, problems)
     return givers, sources
 
 
@@ -62,11 +62,13 @@ def _check_parts(table: Mapping[str, object], parts: PartsTable, problems: Probl
         )
 
 
-def _read_source(name: str, files: Mapping[str, bytes], place: tuple[str, str], problems: Problems) -> dict[str, str]:
+def _read_source(
+    name: str, files: Mapping[str, bytes], key_path: tuple[str, str], problems: Problems
+) -> dict[str, str]:
     try:
         return {name: decode_source(files[name], name).text}
     except UsageError as error:
-        problems.add(place, str(error).rstrip("."))
+        problems.add(key_path, str(error).rstrip("."))
         return {}
 
 
@@ -100,14 +102,15 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
             problems.add(("scenario", number), "second_poses is missing, expected where the second robot starts")
 
 
-def build_second_poses(table: ScenarioTable, poses: int, place: Place, problems: Problems) -> tuple[Pose, ...]:
+def build_second_poses(table: ScenarioTable, poses: int, table_path: Place, problems: Problems) -> tuple[Pose, ...]:
     """Return the second robot's start pose for each pose of the first. A single pose applies to all."""
-    found = tuple(Pose(*pose) for pose in table.second_poses)
-    if len(found) == 1:
-        return found * poses
-    if found and len(found) != poses:
+    second_poses = tuple(Pose(*pose) for pose in table.second_poses)
+    if len(second_poses) == 1:
+        return second_poses * poses
+    if second_poses and len(second_poses) != poses:
         problems.add(
-            (*place, "second_poses"), f"second_poses has {len(found)} poses, expected one, or {poses} as poses has"
+            (*table_path, "second_poses"),
+            f"second_poses has {len(second_poses)} poses, expected one, or {poses} as poses has",
         )
         return ()
-    return found
+    return second_poses

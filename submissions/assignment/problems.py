@@ -54,11 +54,11 @@ class _Scanner:
         while self._skip_blank():
             if self._text.startswith("[[", self._at):
                 self._at += 2
-                place = self._resolve(self._scan_key())
-                number = self._tables_in.get(place, 0)
-                self._tables_in[place] = number + 1
-                self._record_line(place)
-                table = (*place, number)
+                array_path = self._resolve(self._scan_key())
+                number = self._tables_in.get(array_path, 0)
+                self._tables_in[array_path] = number + 1
+                self._record_line(array_path)
+                table = (*array_path, number)
                 self._record_line(table)
                 self._skip_line()
             elif self._text[self._at] == "[":
@@ -163,9 +163,9 @@ class _Scanner:
     def _skip_line(self) -> None:
         self._at = self._text.index("\n", self._at)
 
-    def _record_line(self, path: Path, at: int | None = None) -> None:
-        at = self._at if at is None else at
-        self.lines.setdefault(path, bisect_right(self._line_starts, at))
+    def _record_line(self, path: Path, offset: int | None = None) -> None:
+        offset = self._at if offset is None else offset
+        self.lines.setdefault(path, bisect_right(self._line_starts, offset))
 
 
 class AssignmentProblems(AssignmentError):
@@ -202,13 +202,13 @@ class Problems:
         return tuple(f"{self.where}:{line}: {sentence}" for line, sentence in sorted(dict.fromkeys(self.found)))
 
 
-def check_table(schema: type[T], table: object, place: Path, problems: Problems) -> T | None:
+def check_table(schema: type[T], table: object, table_path: Path, problems: Problems) -> T | None:
     """Validate a table with the schema. Add mistakes to ``problems`` and return None if there are any."""
     result = read_table(schema, table)
     if isinstance(result, schema):
         return result
     for problem in cast(list[Any], result):
-        problems.add((*place, *problem.path), problem.sentence)
+        problems.add((*table_path, *problem.path), problem.sentence)
     return None
 
 
@@ -233,12 +233,12 @@ def filter_texts(value: object) -> list[str]:
 
 
 def check_unique_id(
-    raw: Mapping[str, object], seen: dict[str, int], place: Path, kind: str, problems: Problems
+    raw: Mapping[str, object], id_counts: dict[str, int], table_path: Path, kind: str, problems: Problems
 ) -> None:
     """Report an id that an earlier table of this kind already has."""
     name = raw.get("id")
     if not isinstance(name, str):
         return
-    if name in seen:
-        problems.add((*place, "id"), f'id "{name[:60]}" is the id of an earlier {kind}, expected one of its own')
-    seen[name] = seen.get(name, 0) + 1
+    if name in id_counts:
+        problems.add((*table_path, "id"), f'id "{name[:60]}" is the id of an earlier {kind}, expected one of its own')
+    id_counts[name] = id_counts.get(name, 0) + 1

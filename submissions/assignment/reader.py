@@ -69,50 +69,52 @@ def read_assignment(folder: Path) -> Assignment:
         AssignmentProblems: The assignment cannot be used. The error lists all mistakes.
     """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - resolve() would change the name that is shown
-    where = f"{folder.name}/{FILE_NAME}"
+    source_name = f"{folder.name}/{FILE_NAME}"
     if not folder.is_dir():
         raise AssignmentProblems((f"{folder}: does not exist, expected a folder with {FILE_NAME} in it",))
     if not (folder / FILE_NAME).is_file():
         raise AssignmentProblems((f"{folder}: has no {FILE_NAME} in it, expected one",))
     files = _read_folder_files(folder)
-    text, document = parse_toml(files[FILE_NAME], where)
-    problems = Problems(where, find_lines(text))
+    text, document = parse_toml(files[FILE_NAME], source_name)
+    problems = Problems(source_name, find_lines(text))
     assignment = build_assignment(document, files, problems)
     if assignment is None or problems.found:
         raise AssignmentProblems(problems.sorted())
     return assignment
 
 
-def parse_toml(data: bytes, where: str) -> tuple[str, dict[str, object]]:
+def parse_toml(data: bytes, source_name: str) -> tuple[str, dict[str, object]]:
     """Return the text of a TOML file and its content.
 
     Raises:
-        AssignmentProblems: The file cannot be parsed. The message has ``where`` and the line.
+        AssignmentProblems: The file cannot be parsed. The message has ``source_name`` and the line.
     """
     if len(data) > _MAX_TOML_BYTES:
-        raise AssignmentProblems((f"{where}:1: the file is too large, expected at most 1 MB",))
+        raise AssignmentProblems((f"{source_name}:1: the file is too large, expected at most 1 MB",))
     try:
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise AssignmentProblems((f"{where}:{line}: the text is not UTF-8, expected a file saved as UTF-8",)) from None
+        raise AssignmentProblems(
+            (f"{source_name}:{line}: the text is not UTF-8, expected a file saved as UTF-8",)
+        ) from None
     try:
         return text, read_toml(text)
     except TOMLDecodeError as error:
-        raise AssignmentProblems((_describe_syntax_error(str(error), where, text),)) from None
+        raise AssignmentProblems((_describe_syntax_error(str(error), source_name, text),)) from None
     except UnreadableDataError as error:
-        raise AssignmentProblems((f"{where}:1: {error}, expected ordinary TOML",)) from None
+        raise AssignmentProblems((f"{source_name}:1: {error}, expected ordinary TOML",)) from None
 
 
-def _describe_syntax_error(message: str, where: str, text: str) -> str:
+def _describe_syntax_error(message: str, source_name: str, text: str) -> str:
     match = _SYNTAX.match(message)
-    what = match["what"] if match else message
+    problem = match["what"] if match else message
     if match and match["line"]:
         line, column = int(match["line"]), f" (column {match['column']})"
     else:
         line, column = text.count("\n") + 1, " (at the end)"
-    hint = next((words for begin, words in _PLAINER.items() if what.lower().startswith(begin)), "")
-    return f"{where}:{line}: {what[:1].lower()}{what[1:]}{column}, expected TOML{hint}"
+    hint = next((words for begin, words in _PLAINER.items() if problem.lower().startswith(begin)), "")
+    return f"{source_name}:{line}: {problem[:1].lower()}{problem[1:]}{column}, expected TOML{hint}"
 
 
 def _read_folder_files(folder: Path) -> Mapping[str, bytes]:
@@ -124,8 +126,8 @@ def _read_folder_files(folder: Path) -> Mapping[str, bytes]:
             continue
         size += path.stat().st_size
         if size > _MAX_FOLDER_BYTES:
-            most = _MAX_FOLDER_BYTES // (1024 * 1024)
-            raise AssignmentProblems((f"{folder}: is too large, expected at most {most} MB of files",))
+            max_megabytes = _MAX_FOLDER_BYTES // (1024 * 1024)
+            raise AssignmentProblems((f"{folder}: is too large, expected at most {max_megabytes} MB of files",))
         try:
             files["/".join(parts)] = path.read_bytes()
         except OSError as error:

@@ -70,8 +70,8 @@ class WorldTable(StrictTable):
         if not isinstance(value, str):
             return _as_tuples(value)
         if value not in OBSTACLE_PRESETS:
-            known = f"{join_with_or(OBSTACLE_PRESETS)} or a list of [x, y, width, height]"
-            raise ValueError(f'is "{value[:60]}", expected {known}{suggest_name(value, OBSTACLE_PRESETS)}')
+            choices = f"{join_with_or(OBSTACLE_PRESETS)} or a list of [x, y, width, height]"
+            raise ValueError(f'is "{value[:60]}", expected {choices}{suggest_name(value, OBSTACLE_PRESETS)}')
         return OBSTACLE_PRESETS[value]
 
     @field_validator("robot")
@@ -93,8 +93,8 @@ class PartsTable(StrictTable):
     @field_validator("cell", mode="before")
     @classmethod
     def _check_cell(cls, value: object) -> object:
-        tagged = isinstance(value, str) and value.startswith("tag:") and value.removeprefix("tag:").strip()
-        if value == "last" or tagged or (type(value) is int and 1 <= value <= 1000):
+        tag = isinstance(value, str) and value.startswith("tag:") and value.removeprefix("tag:").strip()
+        if value == "last" or tag or (type(value) is int and 1 <= value <= 1000):
             return value
         raise ValueError('is not a notebook cell, expected "last", "tag:NAME" or the number of a robot program, from 1')
 
@@ -117,9 +117,9 @@ class ChannelTable(StrictTable):
 
     @model_validator(mode="after")
     def _check_link(self) -> Self:
-        needless = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
-        if self.link == "cable" and needless:
-            raise ValueError(f'has {min(needless)} and no link that it limits, expected link = "infrared" beside it')
+        unused_keys = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
+        if self.link == "cable" and unused_keys:
+            raise ValueError(f'has {min(unused_keys)} and no link that it limits, expected link = "infrared" beside it')
         if self.link == "between robots" and self.beacon is not None:
             raise ValueError("has a beacon, but the robots talk to each other, expected no beacon with this link")
         if self.link == "infrared" and self.beacon is None:
@@ -143,10 +143,10 @@ class SweepTable(StrictTable):
     @field_validator("*")
     @classmethod
     def _sort_levels(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        about = CONDITIONS[str(info.field_name)]
+        condition = CONDITIONS[str(info.field_name)]
         if len(set(value)) < len(value):
             raise ValueError("has a level twice, expected each once")
-        return tuple(sorted(_check_range(value, about.most, about.least)))
+        return tuple(sorted(_check_range(value, condition.most, condition.least)))
 
 
 class ScenarioTable(StrictTable):
@@ -233,16 +233,16 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
         # Pydantic's JSON mode is strict about types, but accepts a list for a tuple.
         return schema.model_validate_json(json.dumps(table, default=_encode_foreign_value), strict=True)
     except ValidationError as error:
-        found = error.errors(include_url=False)[:_MOST_PROBLEMS]
-        places = [details["loc"] for details in found]
-        return [describe_problem(schema, details) for details in found if not _is_consequence(details, places)]
+        errors = error.errors(include_url=False)[:_MOST_PROBLEMS]
+        paths = [details["loc"] for details in errors]
+        return [describe_problem(schema, details) for details in errors if not _is_consequence(details, paths)]
 
 
-def _is_consequence(details: ErrorDetails, places: list[tuple[str | int, ...]]) -> bool:
+def _is_consequence(details: ErrorDetails, paths: list[tuple[str | int, ...]]) -> bool:
     """Return whether a list counts as too short only because its entries were rejected."""
-    place = details["loc"]
+    path = details["loc"]
     return details["type"] == "too_short" and any(
-        len(other) > len(place) and other[: len(place)] == place for other in places
+        len(other) > len(path) and other[: len(path)] == path for other in paths
     )
 
 
@@ -250,10 +250,10 @@ def _as_tuples(value: object) -> object:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _check_range(values: tuple[float, ...], most: float, least: float = 0) -> tuple[float, ...]:
+def _check_range(values: tuple[float, ...], maximum: float, minimum: float = 0) -> tuple[float, ...]:
     for value in values:
-        if not least <= value <= most:
-            raise ValueError(f"has {value:g} in it, expected numbers from {least:g} to {most:g}")
+        if not minimum <= value <= maximum:
+            raise ValueError(f"has {value:g} in it, expected numbers from {minimum:g} to {maximum:g}")
     return values
 
 
@@ -311,8 +311,8 @@ def describe_problem(schema: type[BaseModel], details: ErrorDetails) -> TablePro
     bounds = {"greater_than": ("gt", "more than"), "greater_than_equal": ("ge", "at least")}
     bounds |= {"less_than": ("lt", "less than"), "less_than_equal": ("le", "at most")}
     if kind in bounds:
-        key, words = bounds[kind]
-        return TableProblem(path, f"{_format_path(path)} is {value}, expected {words} {context[key]:g}")
+        key, comparison = bounds[kind]
+        return TableProblem(path, f"{_format_path(path)} is {value}, expected {comparison} {context[key]:g}")
     if kind == "decimal_max_places":
         return TableProblem(path, f"{_format_path(path)} is {value}, expected at most two decimal places")
     if kind == "too_short":
@@ -338,10 +338,10 @@ def _describe_unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) 
     for part in path[:-1]:
         field = _collect_fields(schema).get(str(part))
         schema = (_find_table_schema(field.annotation) if field else None) or schema
-    known = list(_collect_fields(schema))
+    known_keys = list(_collect_fields(schema))
     name = str(path[-1])
-    hint = suggest_name(name, known)
-    return f'"{name[:60]}" is not a key of this table, expected {join_with_or(known)}{hint}'
+    hint = suggest_name(name, known_keys)
+    return f'"{name[:60]}" is not a key of this table, expected {join_with_or(known_keys)}{hint}'
 
 
 def _find_table_schema(annotation: object) -> type[BaseModel] | None:
@@ -353,10 +353,10 @@ def _find_table_schema(annotation: object) -> type[BaseModel] | None:
 
 def _format_path(path: tuple[str | int, ...]) -> str:
     """Return the path as text: ``poses[2]``, ``channel.delay``."""
-    words = ""
+    text = ""
     for part in path:
-        words += f"[{part}]" if isinstance(part, int) else f".{part}" if words else part
-    return words or "this table"
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text or "this table"
 
 
 def _describe_entries(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:

@@ -35,8 +35,8 @@ class TaskSheet:
 
 def build_task_sheet(assignment: Assignment) -> TaskSheet:
     """Return the task sheet. Criteria that are not visible contribute only to ``more_marks``."""
-    shown = tuple((each.title, each.marks) for each in assignment.criteria if each.visibility == "visible")
-    marks = sum((marks for _, marks in shown), Decimal(0))
+    visible_criteria = tuple((each.title, each.marks) for each in assignment.criteria if each.visibility == "visible")
+    marks = sum((marks for _, marks in visible_criteria), Decimal(0))
     seconds = [each.seconds for each in assignment.scenarios if each.visibility == "visible"]
     return TaskSheet(
         assignment.id,
@@ -45,7 +45,7 @@ def build_task_sheet(assignment: Assignment) -> TaskSheet:
         assignment.description.strip(),
         _list_required_files(assignment),
         assignment.training is None and assignment.world.robots == 1,
-        shown,
+        visible_criteria,
         marks,
         assignment.max_marks - marks,
         assignment.world.background,

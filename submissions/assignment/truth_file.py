@@ -29,9 +29,11 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
     rows = _read_csv_rows(name, files, "places", "x, y, label")
     if len(rows) > _MOST_PLACES:
         raise UsageError(f"{name} has {len(rows)} rows, expected at most {_MOST_PLACES}")
-    first = 1 if rows and [cell.strip().casefold() for cell in rows[0]] == ["x", "y", "label"] else 0
+    header_rows = 1 if rows and [cell.strip().casefold() for cell in rows[0]] == ["x", "y", "label"] else 0
     places = tuple(
-        _parse_place(row, f"{name}:{number}") for number, row in enumerate(rows, start=1) if number > first and any(row)
+        _parse_place(row, f"{name}:{number}")
+        for number, row in enumerate(rows, start=1)
+        if number > header_rows and any(row)
     )
     if not places:
         raise UsageError(f"{name} has no places, expected rows of x, y, label")
@@ -45,13 +47,13 @@ def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], 
         UsageError: The file or a row cannot be used. The message has the line.
     """
     headings, *rows = _read_csv_rows(name, files, "table", "an answer and arguments") or [[]]
-    kept = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
-    if not kept or len(kept) > _MOST_CALLS:
-        raise UsageError(f"{name} has {len(kept)} rows, expected headings and 1 to {_MOST_CALLS} rows")
-    for number, row in kept:
+    numbered_rows = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
+    if not numbered_rows or len(numbered_rows) > _MOST_CALLS:
+        raise UsageError(f"{name} has {len(numbered_rows)} rows, expected headings and 1 to {_MOST_CALLS} rows")
+    for number, row in numbered_rows:
         if len(row) != len(headings):
             raise UsageError(f"{name}:{number} has {len(row)} cells, expected {len(headings)} as in the first row")
-    return tuple(tuple(row) for _, row in kept)
+    return tuple(tuple(row) for _, row in numbered_rows)
 
 
 def _read_csv_rows(name: str, files: Mapping[str, bytes], key: str, columns: str) -> list[list[str]]:
@@ -67,12 +69,14 @@ def _read_csv_rows(name: str, files: Mapping[str, bytes], key: str, columns: str
         raise UsageError(f"{name} cannot be read: {error}, expected rows of {columns}") from None
 
 
-def _parse_place(row: Sequence[str], where: str) -> LabelledPlace:
+def _parse_place(row: Sequence[str], source_name: str) -> LabelledPlace:
     try:
         x, y, label = (cell.strip() for cell in row)
         place = float(x), float(y), label
     except ValueError:
-        raise UsageError(f"{where}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label") from None
+        raise UsageError(
+            f"{source_name}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label"
+        ) from None
     if not (math.isfinite(place[0]) and math.isfinite(place[1]) and label):
-        raise UsageError(f"{where}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label")
+        raise UsageError(f"{source_name}: {','.join(row)[:60]!r} is not a place, expected x, y (mm) and a label")
     return place

@@ -36,8 +36,8 @@ from submissions.criteria.common import Criterion
 __all__ = ["SCHEMAS", "AnyCriterion", "Criterion"]
 
 
-def _collect_schemas(of: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
-    for schema in of.__subclasses__():
+def _collect_schemas(base: type[Criterion] = Criterion) -> Iterator[tuple[str, type[Criterion]]]:
+    for schema in base.__subclasses__():
         # Classes without ``check`` are shared bases.
         yield from ((name, schema) for name in get_args(schema.model_fields["check"].annotation))
         yield from _collect_schemas(schema)

@@ -34,16 +34,16 @@ class AgentPairCriterion(Criterion):
 
     @model_validator(mode="after")
     def _check_agent_options(self) -> Self:
-        other = next((name for name in _ROBOT_OPTIONS if self.agents and getattr(self, name, None)), None)
-        if other is not None:
-            shown = "json" if other == "json_queue" else other
-            raise ValueError(f"has {shown} beside agents, expected conditions for the text (JSON for a list)")
+        option = next((name for name in _ROBOT_OPTIONS if self.agents and getattr(self, name, None)), None)
+        if option is not None:
+            option_name = "json" if option == "json_queue" else option
+            raise ValueError(f"has {option_name} beside agents, expected conditions for the text (JSON for a list)")
         return self
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if one of the agents does not exist."""
-        yield from super().find_unmet_requirements(around)
-        there = {_RESPONDER, *around.agents}
-        for name in set(self.agents) - there:
-            known = ", ".join(sorted(there)) if around.agents else "an [agents] table with it"
-            yield UnmetRequirement("agents", f'agents names "{name[:60]}", expected {known}')
+        yield from super().find_unmet_requirements(context)
+        agent_names = {_RESPONDER, *context.agents}
+        for name in set(self.agents) - agent_names:
+            expected_names = ", ".join(sorted(agent_names)) if context.agents else "an [agents] table with it"
+            yield UnmetRequirement("agents", f'agents names "{name[:60]}", expected {expected_names}')

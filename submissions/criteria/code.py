@@ -99,9 +99,9 @@ class SourceRules(Criterion):
         names = (text.removeprefix(IMPORT).strip() for text in self.avoids if text.startswith(IMPORT))
         return tuple(name for name in names if all(part.isidentifier() for part in name.split(".")))
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the part whose source is analysed does not exist."""
-        yield from _find_missing_part("part", self.part, around)
+        yield from _find_missing_part("part", self.part, context)
 
     @model_validator(mode="after")
     def _check_options(self) -> Self:
@@ -167,14 +167,14 @@ class Functions(Criterion):
         """The part whose functions are called."""
         return frozenset({"responder"})
 
-    def complete_from(self, around: AssignmentContext) -> Self:
+    def complete_from(self, context: AssignmentContext) -> Self:
         """Return the criterion with a call for each row of its table."""
         if not self.table:
             return self
         if self.calls:
             raise UnmetRequirement("table", "needs calls or a table, expected one of them")
         try:
-            rows = read_table(self.table, around.files)
+            rows = read_table(self.table, context.files)
         except UsageError as error:
             raise UnmetRequirement("table", str(error)) from None
         calls = tuple(
@@ -183,9 +183,9 @@ class Functions(Criterion):
         )
         return self.model_copy(update={"calls": calls})
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if there is no responder."""
-        yield from _find_missing_part("check", "responder", around)
+        yield from _find_missing_part("check", "responder", context)
 
     @model_validator(mode="after")
     def _check_options(self) -> Self:
@@ -227,9 +227,9 @@ class PythonCheck(Criterion):
         """The file with ``check``."""
         return (self.file,)
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the file is not beside the assignment."""
-        if self.file not in around.files:
+        if self.file not in context.files:
             yield UnmetRequirement("file", f'file is "{self.file[:60]}", expected a .py file beside this file')
 
 
@@ -242,6 +242,6 @@ def parse_flag_texts(texts: Texts) -> Flags:
     return parse_magic("%%sim_magic_preloaded " + " ".join(texts))
 
 
-def _find_missing_part(key: str, part: str, around: AssignmentContext) -> Iterator[UnmetRequirement]:
-    if part in around.without:
+def _find_missing_part(key: str, part: str, context: AssignmentContext) -> Iterator[UnmetRequirement]:
+    if part in context.without:
         yield UnmetRequirement(key, f'{key} looks at the {part}, but parts has {part} = "none", expected one')

@@ -119,15 +119,15 @@ class Criterion(StrictTable):
 
     def can_measure(self, name: str) -> bool:
         """Return whether it measures a value with this name."""
-        known = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
-        return any(re.fullmatch(each, name) for each in known)
+        patterns = (re.escape(each).replace(r"\#", r"[1-9]\d*").replace(r"\.\.\.", r".+") for each in self.measures)
+        return any(re.fullmatch(each, name) for each in patterns)
 
     @property
     def python_files(self) -> Texts:
         """The files beside the assignment that run during judging."""
         return ()
 
-    def complete_from(self, around: AssignmentContext) -> Self:
+    def complete_from(self, context: AssignmentContext) -> Self:
         """Return the criterion completed with data from the rest of the assignment.
 
         Raises:
@@ -135,7 +135,7 @@ class Criterion(StrictTable):
         """
         return self
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield all requirements that the assignment does not meet."""
         yield from ()
 

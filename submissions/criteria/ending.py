@@ -66,7 +66,7 @@ class EndPose(Criterion):
     def _check_options(self) -> Self:
         if (self.x is None) != (self.y is None):
             raise ValueError("has one of x and y, expected both")
-        asked = (self.x, self.heading, self.zone, self.areas or None, self.since)
-        if all(each is None for each in asked):
+        conditions = (self.x, self.heading, self.zone, self.areas or None, self.since)
+        if all(each is None for each in conditions):
             raise ValueError("has no condition, expected x and y, heading, zone, areas or since")
         return self

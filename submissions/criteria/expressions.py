@@ -62,7 +62,7 @@ def _compile_pattern(pattern: str, ignore_case: bool) -> Any:
 def _translate_part(part: str) -> str:
     if not part.startswith("["):
         return _OUTSIDE.get(part, part)
-    negated = next((each for each in _ESCAPE.findall(part) if each in (r"\W", r"\S")), None)
-    if negated is not None:
-        raise ValueError(f"{negated} in brackets")
+    negated_escape = next((each for each in _ESCAPE.findall(part) if each in (r"\W", r"\S")), None)
+    if negated_escape is not None:
+        raise ValueError(f"{negated_escape} in brackets")
     return _ESCAPE.sub(lambda escape: _INSIDE.get(escape[0], escape[0]), part)

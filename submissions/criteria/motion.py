@@ -32,8 +32,8 @@ class MotionConditions(StrictTable):
     @property
     def has_motion_conditions(self) -> bool:
         """Return whether any condition is given."""
-        given = (self.forward, self.sideways, self.distance, self.turn, self.turn_size, self.seconds)
-        return any(value is not None for value in given)
+        conditions = (self.forward, self.sideways, self.distance, self.turn, self.turn_size, self.seconds)
+        return any(value is not None for value in conditions)
 
 
 class NamedMotion(MotionConditions):

@@ -83,8 +83,8 @@ class Area(StrictTable):
         if self.bar is not None:
             x1, y1, x2, y2, _ = self.bar
             return f"the bar from ({x1:g}, {y1:g}) to ({x2:g}, {y2:g})"
-        first = (self.polygon or ((0.0, 0.0),))[0]
-        return f"the area with a corner at ({first[0]:g}, {first[1]:g})"
+        corner = (self.polygon or ((0.0, 0.0),))[0]
+        return f"the area with a corner at ({corner[0]:g}, {corner[1]:g})"
 
 
 class LineToFollow(StrictTable):
@@ -133,11 +133,11 @@ class LineToFollow(StrictTable):
             return load_centrelines()[self.on]
         if self.points is not None:
             return (*self.points, self.points[0]) if self.closed else self.points
-        x, y, across, up = self.ellipse or (0.0, 0.0, 0.0, 0.0)
+        x, y, radius_x, radius_y = self.ellipse or (0.0, 0.0, 0.0, 0.0)
         start, end = (math.radians(angle) for angle in self.arc)
         steps = 180
         angles = (start + (end - start) * step / steps for step in range(steps + 1))
-        return tuple((x + across * math.cos(angle), y + up * math.sin(angle)) for angle in angles)
+        return tuple((x + radius_x * math.cos(angle), y + radius_y * math.sin(angle)) for angle in angles)
 
     def length(self) -> float:
         """The length along all corners in mm."""

@@ -100,21 +100,21 @@ class Recognition(Criterion):
         """True: the classifications are answers of a responder."""
         return True
 
-    def complete_from(self, around: AssignmentContext) -> Self:
+    def complete_from(self, context: AssignmentContext) -> Self:
         """Return the criterion with the assignment's aliases, and with the rows of its places file in ``places``."""
-        update: dict[str, object] = {"aliases": {**around.aliases, **self.aliases}}
+        update: dict[str, object] = {"aliases": {**context.aliases, **self.aliases}}
         if isinstance(self.places, str):
             try:
-                update["places"] = read_places(self.places, around.files)
+                update["places"] = read_places(self.places, context.files)
             except UsageError as error:
                 raise UnmetRequirement("places", str(error)) from None
         return self.model_copy(update=update)
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield problems with the truth: no labels on the floor, no label patches, or no truth for a pose."""
-        ground = around.ground
+        ground = context.ground
         if isinstance(self.truth, tuple):
-            for scenario in around.find_scenarios(self):
+            for scenario in context.find_scenarios(self):
                 if len(self.truth) != len(scenario.poses):
                     yield UnmetRequirement(
                         "truth",

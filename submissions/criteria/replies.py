@@ -58,8 +58,8 @@ class Replies(AgentPairCriterion, TextConditions):
             raise ValueError(
                 "has in_order beside other conditions, expected in_order alone (with path and ignore_case)"
             )
-        right = [answer for each in self.expect.values() for answer in list_allowed_answers(each)]
-        if self.path is None and not self.agents and any(not isinstance(answer, str) for answer in right):
+        allowed_answers = [answer for each in self.expect.values() for answer in list_allowed_answers(each)]
+        if self.path is None and not self.agents and any(not isinstance(answer, str) for answer in allowed_answers):
             raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
         return self
 

@@ -74,11 +74,11 @@ class Reports(CriterionWithStrays):
             return tuple(tuple(row) for row in rows)
         raise ValueError('is neither "label" nor a list of lists, expected [[100, "white"], ...], one for each pose')
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem for each scenario whose number of poses differs from the number of lists."""
         if self.expected == "label" or len(self.expected) == 1:
             return
-        for scenario in around.find_scenarios(self):
+        for scenario in context.find_scenarios(self):
             if len(self.expected) != len(scenario.poses):
                 yield UnmetRequirement(
                     "expected",

@@ -32,10 +32,10 @@ class Robustness(Recognition):
     marks_from: Literal["area", "falls_below"] = "area"
     level: float | None = Field(default=None, gt=0, le=1)
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield the problems of recognition, and a problem if no scenario has a sweep over the condition."""
-        yield from super().find_unmet_requirements(around)
-        if not any(scenario.varies(self.along) for scenario in around.find_scenarios(self)):
+        yield from super().find_unmet_requirements(context)
+        if not any(scenario.varies(self.along) for scenario in context.find_scenarios(self)):
             yield UnmetRequirement(
                 "along",
                 f'along is "{self.along}", but no scenario of the criterion is swept over it, '

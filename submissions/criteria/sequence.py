@@ -37,8 +37,8 @@ class WordSequence(CriterionWithStrays):
     @field_validator("words")
     @classmethod
     def _check_words(cls, value: tuple[Texts, ...]) -> tuple[Texts, ...]:
-        for words in value:
-            if not words or not all(any(c.isalnum() for c in word) for word in words):
+        for alternatives in value:
+            if not alternatives or not all(any(c.isalnum() for c in word) for word in alternatives):
                 raise ValueError("has an entry without a letter or digit, expected words to look for")
         return value
 

@@ -53,8 +53,8 @@ class TextSequence(TextConditions, CriterionWithStrays):
 
     @model_validator(mode="after")
     def _check_has_condition(self) -> Self:
-        counted = (self.at_least, self.at_most, self.exactly) != (None, None, None)
-        if not (self.has_conditions or self.in_order or counted or self._has_other_conditions()):
+        has_count = (self.at_least, self.at_most, self.exactly) != (None, None, None)
+        if not (self.has_conditions or self.in_order or has_count or self._has_other_conditions()):
             raise ValueError(
                 "has no condition, expected one of equals, contains, starts_with, matches, among, in_order, "
                 "at_least, at_most, exactly"
@@ -63,12 +63,12 @@ class TextSequence(TextConditions, CriterionWithStrays):
             raise ValueError("has exactly beside at_least or at_most, expected one or the other")
         if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
             raise ValueError("has an at_least above its at_most, expected at_least <= at_most")
-        if self.in_order and (counted or self.last):
+        if self.in_order and (has_count or self.last):
             raise ValueError(
                 "has in_order beside a count or last, "
                 "expected in_order alone (with only = true if nothing else may come)"
             )
-        if self.last and counted:
+        if self.last and has_count:
             raise ValueError("has last beside a count, expected one or the other")
         if self.last and not self.has_conditions:
             raise ValueError(

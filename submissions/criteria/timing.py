@@ -50,28 +50,30 @@ class Ranking(Criterion):
         """The criterion whose value is ranked."""
         return self.of
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if the ranked criterion does not exist, needs another's result, or lacks the value."""
         # A criterion that needs another's result is judged too late to be ranked.
-        others = {each.id: each for each in around.criteria if each.result_needed is None}
-        if self.of not in others:
-            hint = suggest_name(self.of, others)
+        criteria_by_id = {each.id: each for each in context.criteria if each.result_needed is None}
+        if self.of not in criteria_by_id:
+            hint = suggest_name(self.of, criteria_by_id)
             yield UnmetRequirement("of", f'of is "{self.of[:60]}", expected the id of another criterion{hint}')
-        elif not others[self.of].can_measure(self.measure):
-            known = others[self.of].measures
+        elif not criteria_by_id[self.of].can_measure(self.measure):
+            measure_names = criteria_by_id[self.of].measures
             figures = (
-                f"one of {join_with_or(known)}{suggest_name(self.measure, known)}" if known else "one that has figures"
+                f"one of {join_with_or(measure_names)}{suggest_name(self.measure, measure_names)}"
+                if measure_names
+                else "one that has figures"
             )
             yield UnmetRequirement(
                 "measure",
-                f'measure is "{self.measure}", which "{self.of}" ({others[self.of].check}) does not measure, '
+                f'measure is "{self.measure}", which "{self.of}" ({criteria_by_id[self.of].check}) does not measure, '
                 f"expected {figures}",
             )
 
     @model_validator(mode="after")
     def _check_step_order(self) -> Self:
-        for better, worse in pairwise(self.steps):
-            if (better[0] >= worse[0]) != self.highest or better[1] <= worse[1]:
+        for first, second in pairwise(self.steps):
+            if (first[0] >= second[0]) != self.highest or first[1] <= second[1]:
                 raise ValueError("has steps out of order, expected the best first, each worth less than the one before")
         if not all(0 <= share <= 1 for _, share in self.steps):
             raise ValueError("has a share out of range in steps, expected from 0 to 1")

@@ -36,9 +36,9 @@ class Apart(Criterion):
             raise ValueError("has an at_most below at_least, expected room between them")
         return self
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem if there is only one robot, or if ``robot`` selects one of the two."""
         if self.robot != 1:
             yield UnmetRequirement("robot", "robot is 2, but check looks at both robots, expected it without robot")
-        if around.robots < 2:
+        if context.robots < 2:
             yield UnmetRequirement("check", "check is about two robots, but there is one, expected robots = 2 in world")

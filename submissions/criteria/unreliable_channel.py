@@ -43,9 +43,9 @@ class InReach(TextConditions):
     at_least: int = Field(default=1, ge=1)
     misses: int = Field(default=0, ge=0)
 
-    def find_unmet_requirements(self, around: AssignmentContext) -> Iterator[UnmetRequirement]:
+    def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
         """Yield a problem for a cable, which reaches everywhere."""
-        for scenario in around.find_scenarios(self):
+        for scenario in context.find_scenarios(self):
             if scenario.channel.link == "cable":
                 sentence = f'asks how far the link reaches, expected link = "infrared" in scenario "{scenario.id}"'
                 yield UnmetRequirement("check", sentence)

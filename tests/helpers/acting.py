@@ -58,14 +58,18 @@ def retry(store: Store, batch_id: str | None, actor: str = "staff") -> RetryCoun
     return batches.retry_dead(service_on(store), machine(actor), batch_id)
 
 
-def publish(store: Store, batch_id: str, actor: str = "staff", *, anyway: bool = False) -> PublicationCounts:
+def publish(store: Store, batch_id: str, actor: str = "staff", *, includes_unjudged: bool = False) -> PublicationCounts:
     course_id = _course(store, batch_id)
-    return regrades.publish(service_on(store), machine(actor), course_id, batch_id, anyway=anyway)
+    return regrades.publish(service_on(store), machine(actor), course_id, batch_id, includes_unjudged=includes_unjudged)
 
 
-def publish_one(store: Store, job_id: str, actor: str = "staff", *, anyway: bool = False) -> PublicationCounts:
+def publish_one(
+    store: Store, job_id: str, actor: str = "staff", *, includes_unjudged: bool = False
+) -> PublicationCounts:
     course_id = _course_of_job(store, job_id)
-    return regrades.publish_one(service_on(store), machine(actor), course_id, job_id, anyway=anyway)
+    return regrades.publish_one(
+        service_on(store), machine(actor), course_id, job_id, includes_unjudged=includes_unjudged
+    )
 
 
 def regrade(

@@ -53,7 +53,7 @@ def graded(
     tags: Mapping[int, Sequence[str]] | None = None,
 ) -> Grade:
     asked = assignment(folder, parts, given)
-    submission = read_submission(notebook(folder / "ada.ipynb", cells, tags), asked=asked.parts)
+    submission = read_submission(notebook(folder / "ada.ipynb", cells, tags), required_parts=asked.parts)
     return grade(submission, asked, runner=runner)
 
 

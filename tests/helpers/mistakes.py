@@ -58,7 +58,7 @@ def first_screen(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> 
     """Return the cause and the next step in the report of a case, or the reason why the submission is refused."""
     asked = assignment_of(case)
     try:
-        submission = read_submission(write_submission(case, folder), asked=asked.parts)
+        submission = read_submission(write_submission(case, folder), required_parts=asked.parts)
     except UsageError as refusal:
         return str(refusal)
     graded = grade(submission, asked, runner=runner)

@@ -69,7 +69,7 @@ def make_nameless_course(web: Web) -> NamelessCourse:
     _grade_all(web)
     for number, who in enumerate((last, most[0], last, last)):
         request = _request(who, f"{PROGRAM}# {number}\n")
-        intake.accept_submission(web.store, request, max_attempts=3, batch_id=web_batch, most_bytes=10**6)
+        intake.accept_submission(web.store, request, max_attempts=3, batch_id=web_batch, max_bytes=10**6)
     asked = [
         replace(_request(who, f"{PROGRAM}# with names\n"), assignment=replace(echo(), id=NAMED))
         for who in (*STUDENTS, IDLE)

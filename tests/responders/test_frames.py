@@ -147,7 +147,7 @@ def _child(frames: list[bytes], folder: Path, meter: JobMeter) -> Iterator[Child
         os.close(fd)
     ends = reading, writing
     child = Child(lambda: _status(process), process.pid, os.pidfd_open(process.pid), ends, LIMITS, folder)
-    child.begin(meter, blamed=True, has_libraries=True)
+    child.begin(meter, is_blamed=True, has_libraries=True)
     try:
         yield child
     finally:

@@ -65,7 +65,7 @@ def graded(
     for name, source in files.items():
         (own / name).write_text(source)
     asked = read_assignment(task)
-    return grade(read_submission(own, asked=asked.parts), asked, runner=runner)
+    return grade(read_submission(own, required_parts=asked.parts), asked, runner=runner)
 
 
 def first_fault(result: Grade) -> Fault:
@@ -134,7 +134,7 @@ def test_a_responders_and_a_cells_fault_have_it_too(tmp_path: Path, runner: Tria
     notebook(own / "ada.ipynb", cells)
     (own / "helper.py").write_text(files["helper.py"])
     asked = read_assignment(tmp_path / "task")
-    notes = grade(read_submission(own, asked=asked.parts), asked, runner=runner).notes
+    notes = grade(read_submission(own, required_parts=asked.parts), asked, runner=runner).notes
     assert any(note.startswith("cell 2, line 2 of helper.py: ZeroDivisionError") for note in notes)
 
 

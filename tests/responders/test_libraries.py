@@ -61,7 +61,7 @@ def of_notebook(folder: Path, runner: TrialRunner, text: str) -> Recording:
     cells = [text, "def responder(text):\n    return text", "%%sim_magic_preloaded\npass"]
     asked = find_assignment("echo-responder")
     return (
-        grade(read_submission(notebook(folder / "ada.ipynb", cells), asked=asked.parts), asked, runner=runner)
+        grade(read_submission(notebook(folder / "ada.ipynb", cells), required_parts=asked.parts), asked, runner=runner)
         .trials[0]
         .recording
     )

@@ -155,7 +155,7 @@ def test_only_the_marked_run_of_a_notebook_has_lines(
     path = notebook(tmp_path / "eve.ipynb", ["def responder(text):\n    return text\n", run, run])
     asked = find_assignment("echo-responder")
     asked = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios[:1]))
-    grade(read_submission(path, asked=asked.parts), asked, runner=runner)
+    grade(read_submission(path, required_parts=asked.parts), asked, runner=runner)
     assert sorted({bool(each.places) for each in made}) == [False, True]
 
 

@@ -189,7 +189,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
 def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
     """Return ``graded``, or the sentence of the refusal."""
     try:
-        submission = read_submission(path, asked=asked.parts)
+        submission = read_submission(path, required_parts=asked.parts)
     except UsageError as refusal:
         sentence = str(refusal)
         assert "\n" not in sentence

@@ -51,7 +51,7 @@ def test_the_course_notebook_gets_full_marks_for_each_of_its_programs(
 ) -> None:
     found = find_assignment(name)
     asked = replace(found, parts=replace(found.parts, cell=cell), scenarios=found.scenarios[:1])
-    result = grade(read_submission(messaging, asked=asked.parts), asked, runner=runner)
+    result = grade(read_submission(messaging, required_parts=asked.parts), asked, runner=runner)
     lost = [each for each in result.criteria if each.marks < each.max_marks and each.id != "shape-in-noise"]
     assert lost == []
     assert result.verdict is Verdict.FINISHED
@@ -220,7 +220,7 @@ def test_a_notebook_without_the_cell_asked_for_is_refused(tmp_path: Path, cell: 
     asked = assignment(tmp_path, f"cell = {cell}")
     path = notebook(tmp_path / "ada.ipynb", [RESPONDER, PROGRAM], {1: ["plain"]})
     with pytest.raises(UsageError) as refused:
-        read_submission(path, asked=asked.parts)
+        read_submission(path, required_parts=asked.parts)
     assert words in str(refused.value)
 
 
@@ -283,9 +283,9 @@ def test_files_beside_win_when_they_are_what_is_asked_for(tmp_path: Path) -> Non
     folder.mkdir()
     notebook(folder / "notes.ipynb", [RESPONDER, PROGRAM])
     (folder / "robot.py").write_text("say('robot')")
-    program_only = read_submission(folder, asked=Parts(responder="none"))
+    program_only = read_submission(folder, required_parts=Parts(responder="none"))
     assert (program_only.notebook, program_only.program is not None) == (None, True)
-    both = read_submission(folder, asked=Parts())
+    both = read_submission(folder, required_parts=Parts())
     assert both.notebook is not None
     assert (both.program, both.files["robot.py"]) == (None, b"say('robot')")
     (folder / "responder.py").write_text(RESPONDER)

@@ -42,7 +42,7 @@ LOAD = 'import joblib\nnetwork = joblib.load("model.joblib")\ndef responder(text
 
 def graded(folder: Path, runner: TrialRunner) -> Grade:
     asked = find_assignment(str(FOLDER))
-    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
+    return grade(read_submission(folder, required_parts=asked.parts), asked, runner=runner)
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
@@ -180,7 +180,7 @@ def test_a_model_of_more_than_16_mb_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "responder.py").write_text("def responder(text): return text\n")
     (tmp_path / "model.joblib").write_bytes(bytes((16 << 20) + 1))
     with pytest.raises(UsageError, match=r"model\.joblib is too large, expected at most 16 MB a file"):
-        read_submission(tmp_path, asked=asked.parts)
+        read_submission(tmp_path, required_parts=asked.parts)
 
 
 def test_large_models_that_may_be_submitted_can_be_used(runner: TrialRunner) -> None:

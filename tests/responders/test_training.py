@@ -168,7 +168,7 @@ def test_a_notebook_is_no_function_that_trains(runner: TrialRunner, training: As
 
 def collected(runner: TrialRunner, name: str) -> Recording:
     asked = find_assignment("collect-shapes")
-    submission = read_submission(locate_examples("collect-shapes") / name, asked=asked.parts)
+    submission = read_submission(locate_examples("collect-shapes") / name, required_parts=asked.parts)
     return grade(submission, asked, runner=runner).trials[0].recording
 
 
@@ -191,5 +191,5 @@ def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
 def test_what_is_asked_of_training_data(runner: TrialRunner, changes: dict[str, Any], marks: int) -> None:
     asked = find_assignment("collect-shapes")
     criterion = asked.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
-    submission = read_submission(locate_examples("collect-shapes") / "reference", asked=asked.parts)
+    submission = read_submission(locate_examples("collect-shapes") / "reference", required_parts=asked.parts)
     assert grade(submission, replace(asked, criteria=(criterion,)), runner=runner).marks == marks

@@ -33,7 +33,7 @@ def answering(answer: bytes) -> Iterator[str]:
 def get(
     url: str, others: outgoing_requests.Networks = ALL_NETWORKS, most_bytes: int = 0
 ) -> outgoing_requests.HttpResponse:
-    return send_request(url, method="GET", body=None, headers={}, others=others, most_bytes=most_bytes)
+    return send_request(url, method="GET", body=None, headers={}, allowlist=others, most_bytes=most_bytes)
 
 
 def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
@@ -65,7 +65,7 @@ def test_a_name_that_resolves_to_both_is_refused(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
     others = (ip_network("192.168.0.0/16"),)
     with pytest.raises(RequestFailure, match="public address"):
-        send_request("http://two.example.org/", method="POST", body=b"", headers={}, others=others)
+        send_request("http://two.example.org/", method="POST", body=b"", headers={}, allowlist=others)
 
 
 @pytest.mark.parametrize(
@@ -145,6 +145,6 @@ def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.
         thread = Thread(target=answer, daemon=True)
         thread.start()
         with pytest.raises(RequestFailure, match="did not answer"):
-            send_request(url, method="POST", body=b"{}", headers={}, others=ALL_NETWORKS)
+            send_request(url, method="POST", body=b"{}", headers={}, allowlist=ALL_NETWORKS)
         ended.set()
         thread.join()

@@ -114,7 +114,9 @@ def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(
         "seen = roboSim.image_data().vals[0]",
         '%%sim_magic_preloaded -R\nimport time\nprint("IMG_DATA")\ntime.sleep(1)',
     ]
-    result = grade(read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts), asked, runner=runner)
+    result = grade(
+        read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=asked.parts), asked, runner=runner
+    )
     for trial in result.trials:
         (answer,) = (message.text for message in trial.recording.messages if message.sender == "responder")
         pixels = np.array(answer.split(","), np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 3)

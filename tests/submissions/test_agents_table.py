@@ -108,7 +108,7 @@ def folder(path: Path, files: Mapping[str, str]) -> Path:
 @pytest.mark.parametrize("names", [("responder.py", "parser.py"), ("answers.py", "Parser.py")])
 def test_the_files_of_agents_are_no_parts(names: tuple[str, str], tmp_path: Path) -> None:
     files = dict(zip(names, (RESPONDER, PARSER), strict=True))
-    submission = read_submission(folder(tmp_path / "ada", files), asked=ASKED)
+    submission = read_submission(folder(tmp_path / "ada", files), required_parts=ASKED)
     assert submission.program is None
     assert submission.responder is not None
     assert submission.responder.text == RESPONDER
@@ -123,8 +123,8 @@ def test_the_files_of_agents_are_no_parts(names: tuple[str, str], tmp_path: Path
 def test_a_missing_agent_is_named_and_one_too_many_left_out(tmp_path: Path) -> None:
     lone = folder(tmp_path / "ada", {"responder.py": RESPONDER})
     with pytest.raises(UsageError, match=r"has no parser\.py, expected a file for each agent"):
-        read_submission(lone, asked=ASKED)
+        read_submission(lone, required_parts=ASKED)
     full = {"responder.py": RESPONDER, "parser.py": PARSER, "agent.py": PARSER}
-    submission = read_submission(folder(tmp_path / "bob", full), asked=ASKED)
+    submission = read_submission(folder(tmp_path / "bob", full), required_parts=ASKED)
     assert list(submission.files) == ["parser.py"]
     assert "agent.py was left out: the assignment provides this agent." in submission.notes

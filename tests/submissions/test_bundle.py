@@ -48,7 +48,7 @@ def folder(path: Path, files: Mapping[str, str | bytes]) -> Path:
 
 def refusal(path: Path, asked: Parts | None = None) -> str:
     with pytest.raises(UsageError) as error:
-        read_submission(path, asked=asked)
+        read_submission(path, required_parts=asked)
     sentence = str(error.value)
     assert "\n" not in sentence
     assert sentence.startswith(path.name)
@@ -110,7 +110,7 @@ def test_lone_file_without_assignment_goes_by_name_then_by_text(
 
 def test_lone_file_is_the_part_that_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "alice.py").write_text(PROGRAM)
-    submission = read_submission(tmp_path / "alice.py", asked=Parts("robot.py", "student"))
+    submission = read_submission(tmp_path / "alice.py", required_parts=Parts("robot.py", "student"))
     assert submission.responder == SourceFile("alice.py", PROGRAM)
     assert submission.program is None
     assert submission.notes == ("alice.py was used as a responder.",)
@@ -124,14 +124,14 @@ def test_two_files_of_any_name_are_told_apart(tmp_path: Path) -> None:
 
 def test_one_missing_part_of_two_is_named_and_the_other_taken(tmp_path: Path) -> None:
     path = folder(tmp_path / "bob", {"robot.py": PROGRAM, "my_responder.py": RESPONDER})
-    submission = read_submission(path, asked=Parts())
+    submission = read_submission(path, required_parts=Parts())
     assert (submission.program, submission.responder) == (SourceFile("robot.py", PROGRAM), None)
     assert submission.notes == (
         "There is no responder.py (other files: my_responder.py); criteria that need a responder get no marks.",
     )
     lone = tmp_path / "eve.py"
     lone.write_text(RESPONDER)
-    submission = read_submission(lone, asked=Parts())
+    submission = read_submission(lone, required_parts=Parts())
     assert (submission.program, submission.responder) == (None, SourceFile("eve.py", RESPONDER))
     assert "There is no robot.py; criteria that need a robot program get no marks." in submission.notes
 

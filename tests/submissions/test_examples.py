@@ -82,7 +82,7 @@ def grade_example(assignment: str, name: str, runner: TrialRunner) -> Grade:
 
 def grade_failing(name: str, runner: TrialRunner) -> Grade:
     asked = find_assignment("echo-responder")
-    return grade(read_submission(FOLDER / name, asked=asked.parts), asked, runner=runner)
+    return grade(read_submission(FOLDER / name, required_parts=asked.parts), asked, runner=runner)
 
 
 def assert_as_expected(result: Grade, wanted: ExpectedResult) -> None:

@@ -26,30 +26,32 @@ class AgentRole(ResponderRole):
 
     def _serve_messages(self) -> None:
         while True:
-            asked = self._wire.receive()
-            self._units = max(self._units, asked["t"])
+            question = self._wire.receive()
+            self._units = max(self._units, question["t"])
             self._wrap_functions()
             self._stack, self._calls = [self._own_name], 0
-            self._wire.send(call_results.build_result_frame(functools.partial(self._call_agent, asked), self._files))
+            self._wire.send(call_results.build_result_frame(functools.partial(self._call_agent, question), self._files))
 
-    def _call_agent(self, asked: Frame) -> Any:
-        return self._find_function()(*json.loads(asked["arguments"]), **json.loads(asked["named"]))
+    def _call_agent(self, question: Frame) -> Any:
+        return self._find_function()(*json.loads(question["arguments"]), **json.loads(question["named"]))
 
     def _find_function(self) -> Callable[..., Any]:
         """Return the agent's function: the one with its name, else the only ``*_<name>``, else the only function."""
         name = self._own_name
-        own = self._namespace.get(name)
-        if callable(own):
-            return own  # type: ignore[no-any-return]
-        defined = [
+        own_function = self._namespace.get(name)
+        if callable(own_function):
+            return own_function  # type: ignore[no-any-return]
+        named_functions = [
             (each, value)
             for each, value in self._namespace.items()
             if isinstance(value, types.FunctionType) and value.__module__ == "__main__"
         ]
-        found = [value for each, value in defined if each.endswith(f"_{name}")] or [value for _, value in defined]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            names = ", ".join(each for each, _ in defined)
+        functions = [value for each, value in named_functions if each.endswith(f"_{name}")] or [
+            value for _, value in named_functions
+        ]
+        if len(functions) == 1:
+            return functions[0]
+        if functions:
+            names = ", ".join(each for each, _ in named_functions)
             raise LookupError(f"which of {names} is the {name}? call one of them {name}")
         raise LookupError(f"there is no {name}: define a function called {name}")

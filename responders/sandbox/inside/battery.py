@@ -90,7 +90,7 @@ VERSION = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
 
 def run(wire: Wire, _: Grants) -> None:
     """Make all attempts and report those that were not refused."""
-    through = []
+    successes = []
     for name, attempt in ATTEMPTS.items():
         try:
             result = attempt()
@@ -98,5 +98,5 @@ def run(wire: Wire, _: Grants) -> None:
             continue
         if name == "fork" and result == 0:
             os._exit(0)
-        through.append(name)
-    wire.send({"do": "battery", "version": VERSION, "tried": len(ATTEMPTS), "through": through})
+        successes.append(name)
+    wire.send({"do": "battery", "version": VERSION, "tried": len(ATTEMPTS), "through": successes})

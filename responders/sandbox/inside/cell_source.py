@@ -40,27 +40,27 @@ class CellMagic:
 def parse_cell_magic(source: str) -> CellMagic | None:
     """Return the cell magic if the first line, after blanks and comments, begins with ``%%``."""
     lines = source.split("\n")
-    for place, line in enumerate(lines):
+    for index, line in enumerate(lines):
         stripped = line.lstrip("\ufeff").strip()
         if not stripped or stripped.startswith("#"):
             continue
         match = _CELL_MAGIC.match(stripped)
         if match is None:
             return None
-        return CellMagic(match["name"], match["line"] or "", "\n".join(lines[place + 1 :]), place + 1)
+        return CellMagic(match["name"], match["line"] or "", "\n".join(lines[index + 1 :]), index + 1)
     return None
 
 
 def list_cell_magics(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
     """Yield the index and name of each cell magic at the start: the first one, and those that it wraps in turn."""
-    for place, line in enumerate(lines):
+    for index, line in enumerate(lines):
         stripped = line.lstrip("\ufeff").strip()
         if not stripped or stripped.startswith("#"):
             continue
         match = _CELL_MAGIC.match(stripped)
         if match is None:
             return
-        yield place, match["name"]
+        yield index, match["name"]
 
 
 def extract_wrapped_code(line: str) -> str:
@@ -71,17 +71,17 @@ def extract_wrapped_code(line: str) -> str:
 def convert_to_python(source: str) -> str:
     """Return the cell as Python with the same lines."""
     lines = source.lstrip("\ufeff").split("\n")
-    for place in list(_list_statement_starts(lines)):
-        line = lines[place]
+    for index in list(_list_statement_starts(lines)):
+        line = lines[index]
         if not _may_be_special(line):
             continue
-        text, taken = line, 1
-        while text.endswith("\\") and place + taken < len(lines):
-            text = text[:-1] + " " + lines[place + taken].strip()
-            taken += 1
+        text, line_count = line, 1
+        while text.endswith("\\") and index + line_count < len(lines):
+            text = text[:-1] + " " + lines[index + line_count].strip()
+            line_count += 1
         rewritten = _rewrite_line(text)
         if rewritten is not None:
-            lines[place : place + taken] = [rewritten] + [""] * (taken - 1)
+            lines[index : index + line_count] = [rewritten] + [""] * (line_count - 1)
     return "\n".join(lines)
 
 
@@ -129,24 +129,24 @@ def _rewrite_line(text: str) -> str | None:
     """Return the call for a line with a magic, or None for a line of Python."""
     stripped = text.strip()
     indent = text[: len(text) - len(text.lstrip())]
-    assigned = _ASSIGNMENT.match(stripped)
-    if assigned is not None:
-        call = _build_call(assigned["rest"].strip(), captured=True)
-        return None if call is None else f"{indent}{assigned['target']}{call}"
+    assignment = _ASSIGNMENT.match(stripped)
+    if assignment is not None:
+        call = _build_call(assignment["rest"].strip(), is_captured=True)
+        return None if call is None else f"{indent}{assignment['target']}{call}"
     if _QUESTION.match(stripped):
         return f"{indent}get_ipython().run_line_magic('pinfo', {stripped.strip('?')!r})"
     packages = _PACKAGES.match(stripped)
     if packages is not None:
         return f"{indent}get_ipython().run_line_magic({packages['name']!r}, {packages['line']!r})"
-    call = _build_call(stripped, captured=False)
+    call = _build_call(stripped, is_captured=False)
     return None if call is None else indent + call
 
 
-def _build_call(text: str, captured: bool) -> str | None:
+def _build_call(text: str, is_captured: bool) -> str | None:
     if text.startswith("!!"):
         return f"get_ipython().getoutput({text[2:]!r})"
     if text.startswith("!"):
-        return f"get_ipython().{'getoutput' if captured else 'system'}({text[1:]!r})"
+        return f"get_ipython().{'getoutput' if is_captured else 'system'}({text[1:]!r})"
     magic = _LINE_MAGIC.match(text)
     if magic is None:
         return None
@@ -172,11 +172,11 @@ _TOKEN = re.compile(r"\\.|'''|\"\"\"|['\"#()\[\]{}]", re.DOTALL)
 def _list_statement_starts(lines: list[str]) -> Iterator[int]:
     """Yield the indices of the lines on which a statement may begin."""
     state = _ReaderState()
-    for place, line in enumerate(lines):
+    for index, line in enumerate(lines):
         if state.is_at_start:
-            yield place
+            yield index
             # The caller may have rewritten the line by now, which makes it a complete statement.
-            line = lines[place]
+            line = lines[index]
         _update_state(line, state)
 
 

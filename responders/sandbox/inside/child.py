@@ -50,7 +50,7 @@ def list_changed_signals() -> tuple[int, ...]:
 
 
 def run_child(
-    spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], prepared: ChildSetup
+    spec: dict[str, Any], descriptors: list[int], role: Callable[[Wire, lockdown.Grants], None], setup: ChildSetup
 ) -> None:
     """Run a child to its end; never returns.
 
@@ -58,22 +58,22 @@ def run_child(
     """
     try:
         lockdown.pin_to_processors(bytes.fromhex(spec["processors"]))
-        _start_session(prepared.changed_signals)
+        _start_session(setup.changed_signals)
         _raise_oom_score()
-        _set_descriptors([*descriptors[:2], prepared.door, *descriptors[2:]])
+        _set_descriptors([*descriptors[:2], setup.door, *descriptors[2:]])
         _set_limits(spec)
         wire = Wire(_WRITING, _READING)
-        wire.send(_activate_layers(spec, prepared))
+        wire.send(_activate_layers(spec, setup))
         gc.enable()
         gc.collect()  # so that the collector runs at the same allocations in every child
-        role(wire, dataclasses.replace(prepared.grants, excluded_modules=tuple(spec["without"])))
+        role(wire, dataclasses.replace(setup.grants, excluded_modules=tuple(spec["without"])))
     finally:
         os._exit(0)
 
 
-def _start_session(changed: tuple[int, ...]) -> None:
+def _start_session(changed_signals: tuple[int, ...]) -> None:
     os.setsid()
-    for number in changed:
+    for number in changed_signals:
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
@@ -116,13 +116,13 @@ def _set_descriptors(descriptors: list[int]) -> None:
 
     Descriptors for the rules stay open until the layers are active, and all others are closed.
     """
-    high = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
+    high_descriptors = [os.dup2(fd, 100 + place) for place, fd in enumerate(descriptors)]
     null = os.open(os.devnull, os.O_RDWR)
     for fd in (0, 1, 2):
         os.dup2(null, fd)
-    for fd, opened in zip((_WRITING, _READING, _DOOR), high, strict=False):
-        os.dup2(opened, fd)
-    os.chdir(high[3] if len(high) > 3 else "/")
+    for fd, high_descriptor in zip((_WRITING, _READING, _DOOR), high_descriptors, strict=False):
+        os.dup2(high_descriptor, fd)
+    os.chdir(high_descriptors[3] if len(high_descriptors) > 3 else "/")
     os.closerange(_DOOR + 1, lockdown.LOWEST_DESCRIPTOR)
     os.umask(0o077)
 
@@ -130,8 +130,8 @@ def _set_descriptors(descriptors: list[int]) -> None:
 def _set_limits(spec: dict[str, Any]) -> None:
     """Limit the address space beyond the zygote's, CPU time as a backstop, file size, and descriptors."""
     with open("/proc/self/statm", "rb") as statm:
-        mapped = int(statm.read().split()[0]) * resource.getpagesize()
-    memory = mapped + spec["memory"]
+        mapped_bytes = int(statm.read().split()[0]) * resource.getpagesize()
+    memory = mapped_bytes + spec["memory"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     seconds = 2 * int(spec["cpu"]) + 2  # twice the limit, because the worker may watch it for that long
     # The worker acts long before the hard limit, so a SIGKILL that it did not send has another cause.
@@ -144,20 +144,20 @@ def _set_limits(spec: dict[str, Any]) -> None:
     resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))
 
 
-def _activate_layers(spec: dict[str, Any], prepared: ChildSetup) -> Frame:
+def _activate_layers(spec: dict[str, Any], setup: ChildSetup) -> Frame:
     """Activate the layers in the spec, test each, and report them. No student code has run yet."""
-    missing = None
+    missing_layer = None
     landlock, seccomp, own_user = 0, False, False
     without_doorkeeper: str | None = "it was not asked for"
     memory = _open_memory()
     fixed_addresses = lockdown.has_fixed_addresses()
     try:
-        own_user = _switch_user(spec, prepared.grants)
-        _end_with_zygote(prepared.zygote)
+        own_user = _switch_user(spec, setup.grants)
+        _end_with_zygote(setup.zygote)
         lockdown.drop_capabilities()
         lockdown.forbid_new_privileges()
         if spec["landlock"]:
-            landlock = _restrict_files(spec, prepared.rules)
+            landlock = _restrict_files(spec, setup.rules)
         if spec["doorkeeper"]:
             without_doorkeeper = _activate_doorkeeper(memory)
         if spec["seccomp"]:
@@ -166,7 +166,7 @@ def _activate_layers(spec: dict[str, Any], prepared: ChildSetup) -> Frame:
             _check_refused("seccomp", lambda: os.kill(os.getppid(), 0))
             seccomp = True
     except lockdown.LayerMissing as layer:
-        missing = str(layer)
+        missing_layer = str(layer)
     os.closerange(_DOOR, 1 << 16)
     return {
         "do": "sandbox",
@@ -176,7 +176,7 @@ def _activate_layers(spec: dict[str, Any], prepared: ChildSetup) -> Frame:
         "fixed_addresses": fixed_addresses,
         "without_doorkeeper": without_doorkeeper,
         "policy": lockdown.POLICY,
-        "missing": missing,
+        "missing": missing_layer,
     }
 
 

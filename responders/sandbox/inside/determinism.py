@@ -50,7 +50,7 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
     wall_nanoseconds, nanoseconds_since_start = nanoseconds(EPOCH), nanoseconds(0)
 
     real_gmtime, real_strftime, real_asctime = time.gmtime, time.strftime, time.asctime
-    changed: dict[str, Any] = {
+    replacements: dict[str, Any] = {
         "sleep": sleep_seconds,
         "time": wall,
         "time_ns": wall_nanoseconds,
@@ -61,16 +61,16 @@ def install_clock(now: Callable[[], int], sleep: Callable[[int], None]) -> None:
         "asctime": lambda moment=None: real_asctime(real_gmtime(wall()) if moment is None else moment),
         "ctime": lambda seconds=None: real_asctime(real_gmtime(wall() if seconds is None else seconds)),
     }
-    changed["localtime"] = changed["gmtime"]
+    replacements["localtime"] = replacements["gmtime"]
     for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
-        changed[name] = since_start
-        changed[name + "_ns"] = nanoseconds_since_start
-    for name, function in changed.items():
+        replacements[name] = since_start
+        replacements[name + "_ns"] = nanoseconds_since_start
+    for name, function in replacements.items():
         setattr(time, name, function)
     os.times = times
-    loaded = sys.modules.get("timeit")
-    if loaded is not None:
-        loaded.default_timer = since_start  # type: ignore[attr-defined]
+    timeit_module = sys.modules.get("timeit")
+    if timeit_module is not None:
+        timeit_module.default_timer = since_start  # type: ignore[attr-defined]
 
     def moment(cls: type[datetime.datetime], tz: datetime.tzinfo | None = None) -> datetime.datetime:
         utc = cls.fromtimestamp(wall(), datetime.UTC)
@@ -109,12 +109,12 @@ def _seed(self: random.Random, a: Any = None, version: int = 2) -> None:
 
 def install_randomness(seed: int) -> None:
     """Seed ``random`` and numpy, and replace all system sources of randomness by draws from ``seed``."""
-    drawn = 0
+    draw_count = 0
 
     def urandom(size: int) -> bytes:
-        nonlocal drawn
-        drawn += 1
-        return hashlib.shake_256(f"{seed}:{drawn}".encode()).digest(size)
+        nonlocal draw_count
+        draw_count += 1
+        return hashlib.shake_256(f"{seed}:{draw_count}".encode()).digest(size)
 
     os.urandom = urandom
     random._urandom = urandom  # type: ignore[attr-defined]

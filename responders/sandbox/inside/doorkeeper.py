@@ -49,21 +49,21 @@ def start_doorkeeper(grants: lockdown.Grants, controls: Iterable[int]) -> socket
 
     When either of the two ends, so does the other. Only the fork keeps the descriptors ``controls``.
     """
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    keeper = os.getpid()
+    zygote_end, keeper_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    keeper_pid = os.getpid()
     if os.fork() != 0:
         try:
-            ours.close()
+            zygote_end.close()
             for control in controls:
                 os.close(control)
-            _serve_requests(theirs, _KnownPaths(grants))
+            _serve_requests(keeper_end, _KnownPaths(grants))
         finally:
             os._exit(0)
-    theirs.close()
+    keeper_end.close()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != keeper:
+    if os.getppid() != keeper_pid:
         os._exit(0)
-    return ours
+    return zygote_end
 
 
 def register_child(door: socket.socket, questions: int, memory: int) -> None:
@@ -78,34 +78,34 @@ class _KnownPaths:
     def __init__(self, grants: lockdown.Grants) -> None:
         self._beneath = {os.fsencode(path) for path in grants.read}
         self._exactly = {os.fsencode(path) for path in grants.list_only}
-        for known in (self._beneath, self._exactly):
-            known |= {os.path.realpath(path) for path in known}
+        for paths in (self._beneath, self._exactly):
+            paths |= {os.path.realpath(path) for path in paths}
         self._exactly |= {above for path in self._beneath | self._exactly for above in _list_parent_folders(path)}
 
     def has(self, path: bytes, folder: bytes) -> bool:
         """Return whether a child in ``folder`` may name ``path`` and its target."""
         parent, name = os.path.split(os.path.join(folder, path))
-        itself = os.path.join(os.path.realpath(parent), name)
+        real_path = os.path.join(os.path.realpath(parent), name)
         if name in (b"", b".", b".."):
-            itself = os.path.realpath(itself)
-        target = os.path.realpath(itself) if os.path.islink(itself) else itself
-        return self._has(itself, folder) and self._has(target, folder)
+            real_path = os.path.realpath(real_path)
+        target = os.path.realpath(real_path) if os.path.islink(real_path) else real_path
+        return self._has(real_path, folder) and self._has(target, folder)
 
     def _has(self, path: bytes, folder: bytes) -> bool:
-        above = _list_parent_folders(path)
-        if path in self._exactly or path in self._beneath or not self._beneath.isdisjoint(above):
+        parents = _list_parent_folders(path)
+        if path in self._exactly or path in self._beneath or not self._beneath.isdisjoint(parents):
             return True
-        return folder != b"/" and folder in (path, *above)
+        return folder != b"/" and folder in (path, *parents)
 
 
 def _list_parent_folders(path: bytes) -> list[bytes]:
-    found = []
+    folders = []
     while path != (path := os.path.dirname(path)):
-        found.append(path)
-    return found
+        folders.append(path)
+    return folders
 
 
-def _serve_requests(door: socket.socket, known: _KnownPaths) -> None:
+def _serve_requests(door: socket.socket, known_paths: _KnownPaths) -> None:
     """Answer requests until the zygote and its children have ended."""
     lockdown.forbid_new_privileges()
     with contextlib.suppress(lockdown.LayerMissing):
@@ -122,11 +122,11 @@ def _serve_requests(door: socket.socket, known: _KnownPaths) -> None:
                 poll.register(guest.requests, select.EPOLLIN)
             elif event & select.EPOLLIN:
                 with contextlib.suppress(OSError):  # the child may have ended
-                    _answer_request(guests[fd], known)
+                    _answer_request(guests[fd], known_paths)
             else:
-                gone = guests.pop(fd)
-                os.close(gone.requests)
-                os.close(gone.memory)
+                closed_guest = guests.pop(fd)
+                os.close(closed_guest.requests)
+                os.close(closed_guest.memory)
 
 
 def _accept_child(door: socket.socket) -> _RegisteredChild:
@@ -141,29 +141,29 @@ def _accept_child(door: socket.socket) -> _RegisteredChild:
     return _RegisteredChild(questions, memory, folder)
 
 
-def _answer_request(guest: _RegisteredChild, known: _KnownPaths) -> None:
+def _answer_request(guest: _RegisteredChild, known_paths: _KnownPaths) -> None:
     """Answer one request. The child waits and has no other thread that could change the path meanwhile."""
     question = bytearray(_QUESTION.size)
     fcntl.ioctl(guest.requests, _RECEIVE, question)
     identity, _, _, number, _, _, *arguments = _QUESTION.unpack(question)
     try:
-        error = _check_request(guest, known, number, arguments)
+        error = _check_request(guest, known_paths, number, arguments)
     except (OSError, OverflowError, ValueError):
         error = errno.EACCES
     answer = _ANSWER.pack(identity, 0, -error, 0 if error else _CONTINUE)
     fcntl.ioctl(guest.requests, _SEND, answer)
 
 
-def _check_request(guest: _RegisteredChild, known: _KnownPaths, number: int, arguments: list[int]) -> int:
+def _check_request(guest: _RegisteredChild, known_paths: _KnownPaths, number: int, arguments: list[int]) -> int:
     """Return an error number, or 0. A forbidden path appears missing, or can't be opened."""
-    for start, place in PATH_ARGUMENTS[number]:
-        path, end, _ = os.pread(guest.memory, _LONGEST_PATH, arguments[place]).partition(b"\0")
+    for folder_argument, path_argument in PATH_ARGUMENTS[number]:
+        path, end, _ = os.pread(guest.memory, _LONGEST_PATH, arguments[path_argument]).partition(b"\0")
         if not end:
             return errno.ENAMETOOLONG
-        from_here = start is None or ctypes.c_int(arguments[start]).value == _CURRENT_FOLDER
+        is_from_folder = folder_argument is None or ctypes.c_int(arguments[folder_argument]).value == _CURRENT_FOLDER
         # A relative path from a descriptor that the child could open is allowed, except with a step up.
-        known_by_opening = not from_here and not path.startswith(b"/")
-        if b".." in path.split(b"/") if known_by_opening else not known.has(path, guest.folder):
+        is_from_descriptor = not is_from_folder and not path.startswith(b"/")
+        if b".." in path.split(b"/") if is_from_descriptor else not known_paths.has(path, guest.folder):
             return errno.EACCES if number in FLAG_ARGUMENTS else errno.ENOENT
     flags = arguments[FLAG_ARGUMENTS[number]] if number in FLAG_ARGUMENTS else 0
     if flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path)):

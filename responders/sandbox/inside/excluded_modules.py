@@ -82,10 +82,12 @@ def hide_modules(names: tuple[str, ...], libraries: tuple[str, ...], tell: Calla
     for name in names:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
-    loaded = sys.modules
-    kept = {name: module for name, module in loaded.items() if find_exclusion(name, names) is not None}
-    for name in kept:
-        del loaded[name]
+    loaded_modules = sys.modules
+    hidden_modules = {
+        name: module for name, module in loaded_modules.items() if find_exclusion(name, names) is not None
+    }
+    for name in hidden_modules:
+        del loaded_modules[name]
 
     def refusal(module: str) -> ImportError | None:
         error = _build_error(module, names)
@@ -95,26 +97,26 @@ def hide_modules(names: tuple[str, ...], libraries: tuple[str, ...], tell: Calla
 
     @contextlib.contextmanager
     def put_back() -> Iterator[None]:
-        loaded.update(kept)
+        loaded_modules.update(hidden_modules)
         try:
             yield
         finally:
-            for name in kept:
-                loaded.pop(name, None)
+            for name in hidden_modules:
+                loaded_modules.pop(name, None)
 
     real_import = builtins.__import__
 
     def guarded(name: str, globals: Any = None, locals: Any = None, fromlist: Any = (), level: int = 0) -> ModuleType:
         package = (globals or {}).get("__package__") or ""
         module = importlib.util.resolve_name("." * level + name, package) if level else name
-        wanted = (module, *(f"{module}.{item}" for item in fromlist or () if isinstance(item, str)))
-        found = next((each for each in wanted if find_exclusion(each, names) is not None), None)
-        if found is None:
+        module_names = (module, *(f"{module}.{item}" for item in fromlist or () if isinstance(item, str)))
+        excluded_name = next((each for each in module_names if find_exclusion(each, names) is not None), None)
+        if excluded_name is None:
             return real_import(name, globals, locals, fromlist, level)
         if _is_library_import(sys._getframe(1), libraries):
             with put_back():
                 return real_import(name, globals, locals, fromlist, level)
-        error = refusal(found)
+        error = refusal(excluded_name)
         assert error is not None
         raise error
 

@@ -75,10 +75,10 @@ class Wire:
 
     def _hold_acts(self) -> None:
         """Add the actions so far to the delayed output, before the next frame."""
-        acts = self._acts
-        if acts:
+        actions = self._acts
+        if actions:
             self._acts = []
-            self._held += _HEADER.pack(0, len(acts), self._sent) + b"".join(acts)
+            self._held += _HEADER.pack(0, len(actions), self._sent) + b"".join(actions)
             self._sent += 1
 
     def _write(self, data: bytes) -> None:
@@ -146,8 +146,8 @@ def can_send_text(text: str) -> bool:
 def shorten_frame(frame: Frame) -> Frame:
     """Return ``frame`` with its long texts cut to the same length, so that it fits a line."""
     texts = [value for value in _list_values(frame) if isinstance(value, str)]
-    long = sum(len(text) > _NEVER_CUT_LENGTH for text in texts)
-    space = MAX_FRAME_BYTES // max(long, 1) - _WIDEST * _NEVER_CUT_LENGTH * len(texts)
+    long_count = sum(len(text) > _NEVER_CUT_LENGTH for text in texts)
+    space = MAX_FRAME_BYTES // max(long_count, 1) - _WIDEST * _NEVER_CUT_LENGTH * len(texts)
 
     def cut(value: Any) -> Any:
         if isinstance(value, dict):
@@ -156,8 +156,8 @@ def shorten_frame(frame: Frame) -> Frame:
             return value
         return clip(value, space // (_WIDEST if max(value) > "\uffff" else _WIDE))
 
-    fitting: Frame = cut(frame)
-    return fitting
+    short_frame: Frame = cut(frame)
+    return short_frame
 
 
 def _list_values(frame: Frame) -> Iterator[Any]:
@@ -168,6 +168,6 @@ def _list_values(frame: Frame) -> Iterator[Any]:
             yield value
 
 
-def clip(text: str, most: int = 2000) -> str:
-    """Return ``text`` cut to ``most`` characters, with a note."""
-    return text if len(text) <= most else f"{text[:most]}… ({len(text)} characters)"
+def clip(text: str, max_length: int = 2000) -> str:
+    """Return ``text`` cut to ``max_length`` characters, with a note."""
+    return text if len(text) <= max_length else f"{text[:max_length]}… ({len(text)} characters)"

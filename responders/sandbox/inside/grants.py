@@ -45,30 +45,36 @@ _SYSTEM_PATHS = (
 )
 
 
-def list_readable_paths(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the readable files and folders, except all that is ``closed``, even inside one of them."""
-    granted = {*roots, *_list_standard_library(), *_list_packages(), *_list_system_libraries(), *_SYSTEM_PATHS}
+def list_readable_paths(roots: list[str], closed_paths: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the readable files and folders, except all that is ``closed_paths``, even inside one of them."""
+    granted_paths = {*roots, *_list_standard_library(), *_list_packages(), *_list_system_libraries(), *_SYSTEM_PATHS}
     return tuple(
-        {path for place in granted for path in _exclude_closed(place, {os.path.realpath(path) for path in closed})}
+        {
+            path
+            for place in granted_paths
+            for path in _exclude_closed(place, {os.path.realpath(path) for path in closed_paths})
+        }
     )
 
 
-def list_listable_folders(roots: list[str], closed: tuple[str, ...] = ()) -> tuple[str, ...]:
+def list_listable_folders(roots: list[str], closed_paths: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the folders that may be listed, as the import system does. Parents of closed paths are only listable."""
     sites = _list_site_folders()
     tops = tuple(f"{folder}/" for folder in (*sites, *roots))
-    round_closed = {folder for path in closed for folder in _list_parent_folders(path) if f"{folder}/".startswith(tops)}
-    return tuple(sites | round_closed)
+    closed_parents = {
+        folder for path in closed_paths for folder in _list_parent_folders(path) if f"{folder}/".startswith(tops)
+    }
+    return tuple(sites | closed_parents)
 
 
 def is_open_to_others(paths: tuple[str, ...]) -> bool:
     """Return whether a user without privileges can read and reach those of ``paths`` that exist."""
-    there = [path for path in paths if os.path.exists(path)]
-    folders = {os.path.dirname(os.path.realpath(path)) for path in there}
-    while more := {os.path.dirname(folder) for folder in folders} - folders:
-        folders |= more
+    existing_paths = [path for path in paths if os.path.exists(path)]
+    folders = {os.path.dirname(os.path.realpath(path)) for path in existing_paths}
+    while parents := {os.path.dirname(folder) for folder in folders} - folders:
+        folders |= parents
     return all(_has_mode_bits(folder, 0o001) for folder in folders) and all(
-        _has_mode_bits(path, 0o005 if os.path.isdir(path) else 0o004) for path in there
+        _has_mode_bits(path, 0o005 if os.path.isdir(path) else 0o004) for path in existing_paths
     )
 
 
@@ -97,22 +103,22 @@ def _list_standard_library() -> Iterator[str]:
                 yield os.path.join(folder, name)
 
 
-def _exclude_closed(place: str, closed: set[str]) -> Iterator[str]:
-    """Yield ``place``, or its entries that are not closed."""
-    real = os.path.realpath(place)
-    if real in closed:
+def _exclude_closed(path: str, closed_paths: set[str]) -> Iterator[str]:
+    """Yield ``path``, or its entries that are not closed."""
+    real_path = os.path.realpath(path)
+    if real_path in closed_paths:
         return
-    if any(path.startswith(f"{real}/") for path in closed):
-        for name in os.listdir(place):
-            yield from _exclude_closed(os.path.join(place, name), closed)
+    if any(path.startswith(f"{real_path}/") for path in closed_paths):
+        for name in os.listdir(path):
+            yield from _exclude_closed(os.path.join(path, name), closed_paths)
     else:
-        yield place
+        yield path
 
 
 def _list_parent_folders(path: str) -> Iterator[str]:
-    while (above := os.path.dirname(path)) != path:
-        yield above
-        path = above
+    while (parent := os.path.dirname(path)) != path:
+        yield parent
+        path = parent
 
 
 def _list_site_folders() -> set[str]:

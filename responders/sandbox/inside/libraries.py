@@ -48,13 +48,13 @@ _PRELOADED = (
 )
 
 
-def preload(without: list[str]) -> None:
-    """Import the libraries before any fork. Imports may fail if children don't have all of them (``without``)."""
-    missing = (ImportError,) if without else ()
+def preload(exclusions: list[str]) -> None:
+    """Import the libraries before any fork. Imports may fail if children don't have all of them (``exclusions``)."""
+    tolerated_errors = (ImportError,) if exclusions else ()
     for name in _PRELOADED:
-        with contextlib.suppress(*missing):
+        with contextlib.suppress(*tolerated_errors):
             importlib.import_module(name)
-    with contextlib.suppress(*missing):
+    with contextlib.suppress(*tolerated_errors):
         _query_machine()
 
 

@@ -97,8 +97,8 @@ def can_change_user() -> bool:
     sets = ctypes.create_string_buffer(24)
     if os.geteuid() != 0 or _libc.syscall(_SYS_CAPGET, _CAPABILITIES, sets) != 0:
         return False
-    effective = struct.unpack_from("=I", sets)[0]
-    return all(effective >> power & 1 for power in (_CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID))
+    effective_set = struct.unpack_from("=I", sets)[0]
+    return all(effective_set >> power & 1 for power in (_CHOWN, _DAC_OVERRIDE, _KILL, _SETGID, _SETUID))
 
 
 def switch_user(user: int) -> None:
@@ -135,15 +135,15 @@ def _move_descriptor(fd: int) -> int:
         os.close(fd)
 
 
-def build_writing_rule(folder: int, most: int = 99) -> bytes:
-    """Return the rule that allows writing in a flat folder, for Landlock up to version ``most``."""
-    own = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
-    return _RULE.pack(own & _look_up_file_rights(min(read_landlock_version(), most)), folder)
+def build_writing_rule(folder: int, limit: int = 99) -> bytes:
+    """Return the rule that allows writing in a flat folder, for Landlock up to version ``limit``."""
+    rights = _READ_FILE | _READ_DIR | _WRITE_FILE | _MAKE_REG | _REMOVE_FILE | _TRUNCATE
+    return _RULE.pack(rights & _look_up_file_rights(min(read_landlock_version(), limit)), folder)
 
 
-def restrict_files(rules: Iterable[bytes], most: int = 99) -> int:
-    """Restrict this process to the files that ``rules`` allow. Return the Landlock version in use, up to ``most``."""
-    version = min(read_landlock_version(), most)
+def restrict_files(rules: Iterable[bytes], limit: int = 99) -> int:
+    """Restrict this process to the files that ``rules`` allow. Return the Landlock version in use, up to ``limit``."""
+    version = min(read_landlock_version(), limit)
     if version < 1:
         raise LayerMissing(
             "Landlock: the kernel does not have it or it is switched off (needs 5.13 with landlock in lsm=)"
@@ -167,8 +167,8 @@ def _look_up_file_rights(version: int) -> int:
 def _create_ruleset(rights: int, version: int) -> int:
     sizes = {1: 8, 2: 8, 3: 8, 4: 16, 5: 16}
     attribute = struct.pack("=QQQ", rights, _NETWORK_RIGHTS, _SCOPES)
-    wanted = [sizes.get(version, 24), 16, 8] if version >= 4 else [8]
-    for size in wanted:
+    attribute_sizes = [sizes.get(version, 24), 16, 8] if version >= 4 else [8]
+    for size in attribute_sizes:
         # Some kernels report a version but lack its scopes. Then the scopes are left out.
         ruleset = _libc.syscall(_SYS_LANDLOCK_CREATE_RULESET, attribute[:size], ctypes.c_size_t(size), 0)
         if ruleset >= 0:

@@ -52,24 +52,24 @@ def explain_joblib_errors() -> None:
     load = joblib.load
 
     @functools.wraps(load)
-    def explained(filename: Any, *args: Any, **more: Any) -> Any:
+    def explained(filename: Any, *args: Any, **options: Any) -> Any:
         file = os.path.basename(filename) if isinstance(filename, str) else "the model"
         try:
-            return load(filename, *args, **more)
+            return load(filename, *args, **options)
         except (FileNotFoundError, MemoryError):
             raise
         except PermissionError as error:
-            words = error.args[1] if len(error.args) > 1 else error
-            raise PermissionError(f"{file} was stopped while it was loaded: {words}") from None
+            cause = error.args[1] if len(error.args) > 1 else error
+            raise PermissionError(f"{file} was stopped while it was loaded: {cause}") from None
         except ModuleNotFoundError as error:
             package = str(error.name).partition(".")[0]
             raise ModuleNotFoundError(
                 f"{file} needs the package {package}, which responders here do not have", name=error.name
             ) from None
         except Exception as error:
-            words = f"{type(error).__name__}: {str(error)[:200]}"
+            cause = f"{type(error).__name__}: {str(error)[:200]}"
             raise ValueError(
-                f"{file} cannot be loaded as a model, expected one that joblib.dump or pickle.dump wrote ({words})"
+                f"{file} cannot be loaded as a model, expected one that joblib.dump or pickle.dump wrote ({cause})"
             ) from None
 
     joblib.load = numpy_pickle.load = explained
@@ -82,16 +82,16 @@ def install_version_notes(tell: Callable[[str], None]) -> None:
     from sklearn.exceptions import InconsistentVersionWarning
 
     show = warnings.showwarning
-    told: set[str] = set()
+    reported_versions: set[str] = set()
 
     def show_or_tell(message: Any, category: Any, *more: Any, **others: Any) -> None:
         if not isinstance(message, InconsistentVersionWarning):
             show(message, category, *more, **others)
             return
-        saved, read = str(message.original_sklearn_version)[:20], str(message.current_sklearn_version)[:20]
-        if saved not in told and len(told) < 3:
-            told.add(saved)
-            sentence = f"a model was saved by scikit-learn {saved} and is read by {read}; it may answer differently"
+        saver, reader = str(message.original_sklearn_version)[:20], str(message.current_sklearn_version)[:20]
+        if saver not in reported_versions and len(reported_versions) < 3:
+            reported_versions.add(saver)
+            sentence = f"a model was saved by scikit-learn {saver} and is read by {reader}; it may answer differently"
             tell(sentence)
 
     warnings.showwarning = show_or_tell

@@ -49,15 +49,15 @@ def suggest_fix(error: BaseException) -> str:
         if isinstance(error, AttributeError) and error.name is not None:
             return _suggest_module_function(error) or _suggest_near_name(error.name, dir(error.obj), 0.7)
         if isinstance(error, ModuleNotFoundError) and str(error).startswith("No module named"):
-            brick = _BRICK if "brick_link" in sys.modules else ()
+            brick_modules = _BRICK if "brick_link" in sys.modules else ()
             name = str(error.name)
-            return _suggest_near_name(name, [*brick, *_LIBRARIES], 0.8) or _suggest_near_name(
+            return _suggest_near_name(name, [*brick_modules, *_LIBRARIES], 0.8) or _suggest_near_name(
                 name, [*sys.stdlib_module_names, *sys.modules], 0.8
             )
         if isinstance(error, FileNotFoundError) and isinstance(error.filename, str) and os.getcwd() != "/":
             return _suggest_near_name(error.filename, os.listdir(), 0.7)
-        found = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
-        return _suggest_near_name(found[1], dir(sys.modules.get(found[2])), 0.7) if found else ""
+        import_match = _CANNOT_IMPORT.search(str(error)) if isinstance(error, ImportError) else None
+        return _suggest_near_name(import_match[1], dir(sys.modules.get(import_match[2])), 0.7) if import_match else ""
     except Exception:
         # ``dir`` may run code of the student's objects, which may raise anything.
         return ""
@@ -68,29 +68,29 @@ def _suggest_for_name(error: NameError) -> str:
     statement = f"import {name}" if name in sys.stdlib_module_names else _IMPORTS.get(name)
     if statement is not None:
         return f"Did you forget {statement}?"
-    known: list[str] = [*dir(builtins), *keyword.kwlist]
+    known_names: list[str] = [*dir(builtins), *keyword.kwlist]
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     if trace is not None:
-        known = [*trace.tb_frame.f_locals, *trace.tb_frame.f_globals, *known]
-    return _suggest_near_name(name, known, 0.7)
+        known_names = [*trace.tb_frame.f_locals, *trace.tb_frame.f_globals, *known_names]
+    return _suggest_near_name(name, known_names, 0.7)
 
 
 def _suggest_module_function(error: AttributeError) -> str:
     module = getattr(error.obj, "__name__", "") if isinstance(error.obj, ModuleType) else ""
-    meant = _FOREIGN_NAMES.get(module, {}).get(str(error.name).lower())
-    return f"Did you mean {module}.{meant}?" if meant else ""
+    function_name = _FOREIGN_NAMES.get(module, {}).get(str(error.name).lower())
+    return f"Did you mean {module}.{function_name}?" if function_name else ""
 
 
-def _suggest_near_name(name: str, known: Iterable[object], least: float) -> str:
-    """Return ``Did you mean print?`` for the best match of ``name`` among ``known``, or ""."""
-    names = [each for each in known if type(each) is str and len(each) <= _LONGEST_NAME][:_MOST_KNOWN]
+def _suggest_near_name(name: str, known_names: Iterable[object], cutoff: float) -> str:
+    """Return ``Did you mean print?`` for the best match of ``name`` among ``known_names``, or ""."""
+    names = [each for each in known_names if type(each) is str and len(each) <= _LONGEST_NAME][:_MOST_KNOWN]
     if name in names or len(name) > _LONGEST_NAME:
         return ""
-    usable = {_normalise_name(each): each for each in reversed(names) if not each.startswith("_")}
-    near = difflib.get_close_matches(_normalise_name(name), usable, 1, least)
-    return f"Did you mean {usable[near[0]]}?" if near else ""
+    candidates = {_normalise_name(each): each for each in reversed(names) if not each.startswith("_")}
+    matches = difflib.get_close_matches(_normalise_name(name), candidates, 1, cutoff)
+    return f"Did you mean {candidates[matches[0]]}?" if matches else ""
 
 
 def _normalise_name(name: str) -> str:

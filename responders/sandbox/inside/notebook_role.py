@@ -56,13 +56,13 @@ class NotebookRole(ResponderRole):
         builtins.exit = builtins.quit = _exit_cell  # type: ignore[assignment]
         text = "".join(source + "\n" for source in self._spec["cells"])
         linecache.cache[self._name] = (len(text), None, text.splitlines(keepends=True), self._name)
-        above = 0
-        for place, source in enumerate(self._spec["cells"]):
-            self._wire.send({"do": "cell", "place": place, "answers": self._explain_missing_responder() is None})
-            error = self._execute_cell(source, above)
+        line_count = 0
+        for index, source in enumerate(self._spec["cells"]):
+            self._wire.send({"do": "cell", "place": index, "answers": self._explain_missing_responder() is None})
+            error = self._execute_cell(source, line_count)
             if error is not None:
                 self._wire.send({"do": "raised", "error": error})
-            above += source.count("\n") + 1
+            line_count += source.count("\n") + 1
         self._wire.send({"do": "executed", "missing": self._explain_missing_responder()})
         self._note_own_msg()
         self._serve_messages()
@@ -119,7 +119,7 @@ class NotebookRole(ResponderRole):
             return
         self._note_own_msg()
         self._robot_runs = True
-        began = self._units
+        start = self._units
         line = self._files.find_main_line(sys._getframe())
         self._wire.send(
             {
@@ -134,11 +134,11 @@ class NotebookRole(ResponderRole):
         while True:
             frame = self._wire.receive()
             if frame["do"] == "message":
-                self._answer_message(frame, began)
+                self._answer_message(frame, start)
                 continue
             break
         self._robot_runs = False
-        self._units = max(self._units, began + frame["t"])
+        self._units = max(self._units, start + frame["t"])
         roboSim.collect(frame["data"], frame["images"])
         roboSim.robot_state = frame["state"] or {}
 
@@ -149,27 +149,27 @@ class NotebookRole(ResponderRole):
         state: dict[str, Any] = self._wire.receive()["state"]
         return state
 
-    def _execute_cell(self, source: str, above: int) -> Frame | None:
-        """Run one cell. ``above`` is the number of lines before it. Return the error that ended it, or None."""
+    def _execute_cell(self, source: str, line_offset: int) -> Frame | None:
+        """Run one cell. ``line_offset`` is the number of lines before it. Return the error that ended it, or None."""
         try:
-            self._run_source(source, above)
+            self._run_source(source, line_offset)
         except BaseException as error:
             if isinstance(error, SystemExit) and error.code in (None, 0):
                 return None
             return self._files.describe_error(error)
         return None
 
-    def _run_source(self, source: str, above: int) -> None:
+    def _run_source(self, source: str, line_offset: int) -> None:
         magic = cell_source.parse_cell_magic(source)
         if magic is not None:
-            self._call_cell_magic(magic, above)
+            self._call_cell_magic(magic, line_offset)
         else:
-            self._run_cell(cell_source.convert_to_python(source), above)
+            self._run_cell(cell_source.convert_to_python(source), line_offset)
 
-    def _call_cell_magic(self, magic: cell_source.CellMagic, above: int) -> None:
-        self._body_above = above + magic.number
+    def _call_cell_magic(self, magic: cell_source.CellMagic, line_offset: int) -> None:
+        self._body_above = line_offset + magic.number
         tree = ast.parse("get_ipython().run_cell_magic(_robomark_name, _robomark_line, _robomark_body)", self._name)
-        ast.increment_lineno(tree, above + magic.number - 1)
+        ast.increment_lineno(tree, line_offset + magic.number - 1)
         names = {
             "_robomark_name": magic.name,
             "_robomark_line": magic.line,
@@ -177,33 +177,33 @@ class NotebookRole(ResponderRole):
         }
         exec(compile(tree, self._name, "exec", dont_inherit=True), names)
 
-    def _run_cell(self, text: str, above: int) -> None:
-        value = self._evaluate(text, above)
+    def _run_cell(self, text: str, line_offset: int) -> None:
+        value = self._evaluate(text, line_offset)
         if value is not None and not text.rstrip().endswith(";"):
             self._namespace["_"] = value
             # Memory addresses are removed, because they differ between runs.
             print(_ADDRESS.sub("", clip(repr(value), _LONGEST_OUTPUT)))
 
-    def _evaluate(self, text: str, above: int) -> Any:
+    def _evaluate(self, text: str, line_offset: int) -> Any:
         """Run the text and return the value of its last line, if it is an expression.
 
-        ``above`` is the number of lines before it.
+        ``line_offset`` is the number of lines before it.
         """
         try:
             tree = ast.parse(text, self._name)
         except SyntaxError as error:
             if error.lineno is not None:
-                error.lineno += above
+                error.lineno += line_offset
             raise
-        last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
-        ast.increment_lineno(tree, above)
+        last_statement = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        ast.increment_lineno(tree, line_offset)
         exec(compile(tree, self._name, "exec", dont_inherit=True), self._namespace)
-        if last is None:
+        if last_statement is None:
             return None
-        assert isinstance(last, ast.Expr)
-        shown = ast.Expression(last.value)
-        ast.increment_lineno(shown, above)
-        return eval(compile(shown, self._name, "eval", dont_inherit=True), self._namespace)
+        assert isinstance(last_statement, ast.Expr)
+        expression = ast.Expression(last_statement.value)
+        ast.increment_lineno(expression, line_offset)
+        return eval(compile(expression, self._name, "eval", dont_inherit=True), self._namespace)
 
     def _explain_missing_responder(self) -> str | None:
         """Return why there is no responder for the robot, or None if there is one."""
@@ -215,8 +215,8 @@ class NotebookRole(ResponderRole):
 
     def _note_own_msg(self) -> None:
         """Note whether the notebook has its own global ``msg``. Otherwise ``msg`` is set to each text received."""
-        mine = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
-        self._defines_msg = "msg" in self._namespace and not mine
+        is_given = self._given_msg is not None and self._namespace.get("msg") == self._given_msg
+        self._defines_msg = "msg" in self._namespace and not is_given
 
     def _answer_text(self, text: str) -> Frame:
         frame = super()._answer_text(text)

@@ -84,16 +84,16 @@ class _OwnModuleFinder(MetaPathFinder, Loader):
         if text is None:
             return None
         file = f"{fullname}.py"
-        found = ModuleSpec(fullname, self, origin=file, loader_state=text)
-        found.has_location = True
-        return found
+        spec = ModuleSpec(fullname, self, origin=file, loader_state=text)
+        spec.has_location = True
+        return spec
 
     def create_module(self, spec: ModuleSpec) -> None:
         """Return None for a standard module object."""
 
     def exec_module(self, module: ModuleType) -> None:
-        found = module.__spec__
-        assert found is not None
-        assert found.origin is not None
-        self._files.imported.add(found.origin)
-        self._files.execute(found.loader_state, found.origin, module.__dict__)
+        spec = module.__spec__
+        assert spec is not None
+        assert spec.origin is not None
+        self._files.imported.add(spec.origin)
+        self._files.execute(spec.loader_state, spec.origin, module.__dict__)

@@ -37,18 +37,18 @@ _MESSAGES = {
 
 def install_refusals(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
     """Install the errors. ``tell(sentence)`` is called for the first few, inside the refused call."""
-    here = os.getcwd()
-    own = (here,) if here != "/" else ()
+    folder = os.getcwd()
+    own_folders = (folder,) if folder != "/" else ()
     libraries = tuple(path.rstrip("/") + "/" for path in grants.read)
-    folders = (*libraries, *(f"{path}/" for path in own))
-    files = frozenset((*grants.read, *own))
-    told: set[tuple[str, str | None, int | None]] = set()
+    folders = (*libraries, *(f"{path}/" for path in own_folders))
+    files = frozenset((*grants.read, *own_folders))
+    reported_refusals: set[tuple[str, str | None, int | None]] = set()
 
     def note(sentence: str) -> None:
-        place = student.locate_frame(sys._getframe())
-        once = (sentence, place["file"], place["line"])
-        if once not in told and len(told) < _MAX_REPORTS:
-            told.add(once)
+        location = student.locate_frame(sys._getframe())
+        refusal = (sentence, location["file"], location["line"])
+        if refusal not in reported_refusals and len(reported_refusals) < _MAX_REPORTS:
+            reported_refusals.add(refusal)
             tell(sentence)
 
     def refuse(sentence: str) -> PermissionError:
@@ -69,5 +69,5 @@ def install_refusals(grants: Grants, student: StudentFiles, tell: Callable[[str]
 
     sys.addaudithook(hook)
     if grants.excluded_modules:
-        ours = (os.path.dirname(__file__), "<preamble>")
-        excluded_modules.hide_modules(grants.excluded_modules, (*grants.read, *libraries, *ours), note)
+        own_sources = (os.path.dirname(__file__), "<preamble>")
+        excluded_modules.hide_modules(grants.excluded_modules, (*grants.read, *libraries, *own_sources), note)

@@ -78,11 +78,11 @@ class ResponderRole:
             else:
                 self._answer_message(message, 0)
 
-    def _answer_message(self, message: Frame, began: int) -> None:
-        """Answer one message of the run that began at ``began``. The message contains the robot's new log entries."""
+    def _answer_message(self, message: Frame, start: int) -> None:
+        """Answer one message of the run that began at ``start``. The message contains the robot's new log entries."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
-        self._units = max(self._units, began + message["t"])
+        self._units = max(self._units, start + message["t"])
         roboSim.collect(message.get("data", []), message.get("images", []))
         if "sender" in message and not self._defines_sender:
             self._namespace["sender"] = message["sender"]
@@ -114,16 +114,16 @@ class ResponderRole:
             raise LookupError(f"roboSim.pyresponder is a {kind} and no function: assign the function without brackets")
         if callable(self._namespace.get("responder")):
             return self._namespace["responder"]  # type: ignore[no-any-return]
-        found = {
+        functions = {
             name: value
             for name, value in self._namespace.items()
             if name.endswith("_responder") and isinstance(value, types.FunctionType)
         }
-        if len(found) == 1:
-            return next(iter(found.values()))
-        if found:
+        if len(functions) == 1:
+            return next(iter(functions.values()))
+        if functions:
             raise LookupError(
-                f"which of {', '.join(found)} is the responder? assign one of them to roboSim.pyresponder"
+                f"which of {', '.join(functions)} is the responder? assign one of them to roboSim.pyresponder"
             )
         raise LookupError(
             "there is no responder: define a function called responder, or assign one to roboSim.pyresponder"
@@ -198,14 +198,14 @@ class ResponderRole:
         self._units += units
         self._wire.send({"do": "sleep", "units": min(units, 10**15)})
 
-    def _advance_time(self, until: int) -> None:
-        self._units = max(self._units, until)
+    def _advance_time(self, units: int) -> None:
+        self._units = max(self._units, units)
 
     def _emit(self, text: str) -> None:
         self._wire.send({"do": "print", "text": self._files.remove_folders(text)})
 
-    def _report_refusal(self, what: str) -> None:
-        self._wire.send({"do": "refused", "what": what, **self._files.locate_frame(sys._getframe())})
+    def _report_refusal(self, sentence: str) -> None:
+        self._wire.send({"do": "refused", "what": sentence, **self._files.locate_frame(sys._getframe())})
 
     def _report_busy(self, _: int, frame: FrameType | None) -> None:
         try:

@@ -15,14 +15,14 @@ run = responder_zygote.run
 _COURSE_MODULES = ("nn_tools.network_views", "nn_tools.sensor_data", "nn_tools.weights")
 
 
-def preload(without: list[str]) -> None:
-    """Import the modules of responders before any fork. Some may fail without the modules in ``without``."""
-    responder_zygote.preload(without)
-    libraries.preload(without)
-    missing = (ImportError,) if without else ()
+def preload(exclusions: list[str]) -> None:
+    """Import the modules of responders before any fork. Some may fail without the modules in ``exclusions``."""
+    responder_zygote.preload(exclusions)
+    libraries.preload(exclusions)
+    tolerated_errors = (ImportError,) if exclusions else ()
     for name in _COURSE_MODULES:
-        with contextlib.suppress(*missing):
+        with contextlib.suppress(*tolerated_errors):
             importlib.import_module(name)
     model_files.preload_runtimes()
-    with contextlib.suppress(*missing):
+    with contextlib.suppress(*tolerated_errors):
         model_files.explain_joblib_errors()

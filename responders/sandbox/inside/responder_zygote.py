@@ -20,7 +20,7 @@ from .static_analysis import reader  # noqa: F401
 NEEDED = ("nbev3devsim.load_nbev3devwidget", "nbev3devsim.placeholders")
 
 
-def preload(without: list[str]) -> None:
+def preload(exclusions: list[str]) -> None:
     """Import the standard modules that responders use without a library."""
     for name in libraries.STANDARD_MODULES:
         importlib.import_module(name)

@@ -23,7 +23,7 @@ from .statement_watch import StatementWatch
 NEEDED = ("brick_link", "brick_preambles", "ev3dev2_glue")
 
 
-def preload(without: list[str]) -> None:
+def preload(exclusions: list[str]) -> None:
     """Compile the preambles."""
     compile_preambles()
 
@@ -61,18 +61,18 @@ def run(wire: Wire, grants: Grants) -> None:
     def sleep(units: int) -> None:
         link.wait_units(units)
 
-    def told(what: str) -> None:
-        wire.send({"do": "refused", "what": what, **files.locate_frame(sys._getframe())})
+    def report_refusal(sentence: str) -> None:
+        wire.send({"do": "refused", "what": sentence, **files.locate_frame(sys._getframe())})
 
     signal.signal(signal.SIGXCPU, busy)
     link.number = spec.get("number", 1)
     link.connect(wire, stuck, spec["sensors"], spec["tick"], files.pack_main_lines)
     student_code.install_output(emit)
-    student_code.install_warnings(told)
+    student_code.install_warnings(report_refusal)
     determinism.install_clock(now, sleep)
     determinism.install_randomness(spec["seed"])
-    refusals.install_refusals(grants, files, told)
-    own_modules.install_importer(own_modules.build_source(spec["modules"]), spec["modules"], files, told)
+    refusals.install_refusals(grants, files, report_refusal)
+    own_modules.install_importer(own_modules.build_source(spec["modules"]), spec["modules"], files, report_refusal)
     module = types.ModuleType("__main__")
     sys.modules["__main__"] = module
     wire.send({"do": "end", "error": _execute_program(spec, module.__dict__, files)})

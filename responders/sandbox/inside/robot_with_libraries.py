@@ -11,7 +11,7 @@ NEEDED = robot_role.NEEDED
 run = robot_role.run
 
 
-def preload(without: list[str]) -> None:
+def preload(exclusions: list[str]) -> None:
     """Make the preparations of ``robot_role`` and import the libraries."""
-    robot_role.preload(without)
-    libraries.preload(without)
+    robot_role.preload(exclusions)
+    libraries.preload(exclusions)

@@ -155,13 +155,13 @@ class Shell:
             raise AttributeError(name)
         return lambda *args, **kwargs: None
 
-    def _report_unsupported(self, name: str, shown: str) -> None:
+    def _report_unsupported(self, name: str, line: str) -> None:
         if name in _PROGRAM_MAGICS:
-            self._requester.note(f"{_shorten_line(shown)} was refused: {refusals.PROGRAMS}")
+            self._requester.note(f"{_shorten_line(line)} was refused: {refusals.PROGRAMS}")
         elif name in _PACKAGE_MAGICS:
-            self._requester.note(f"{shown} was refused: {_PACKAGE_MESSAGE}")
+            self._requester.note(f"{line} was refused: {_PACKAGE_MESSAGE}")
         elif name not in _IGNORED_MAGICS:
-            self._requester.note(f"{_shorten_line(shown)} was skipped: it is not known here")
+            self._requester.note(f"{_shorten_line(line)} was skipped: it is not known here")
 
     def _print_files(self, line: str) -> None:
         for name in _split_words(line):
@@ -184,9 +184,9 @@ class Shell:
         print("  ".join(sorted(os.listdir("."))))
 
     def _write_file(self, line: str, body: str) -> None:
-        words = _split_words(line)
-        adds = [word for word in words if word in ("-a", "--append")]
-        names = [word for word in words if word not in ("-a", "--append")]
+        arguments = _split_words(line)
+        adds = [word for word in arguments if word in ("-a", "--append")]
+        names = [word for word in arguments if word not in ("-a", "--append")]
         if len(names) != 1:
             raise ValueError("%%writefile needs the name of one file")
         verb = "Appending to" if adds else "Overwriting" if os.path.exists(names[0]) else "Writing"

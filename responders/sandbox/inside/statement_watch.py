@@ -48,9 +48,9 @@ class _StatementTable(dict[int, None]):
     def __init__(self, send: Callable[[Frame], None], file: str | None) -> None:
         self._send, self._file = send, file
 
-    def __missing__(self, place: int) -> None:
-        self[place] = None
-        line, column = divmod(place, _LONGEST_LINE)
+    def __missing__(self, position: int) -> None:
+        self[position] = None
+        line, column = divmod(position, _LONGEST_LINE)
         self._send({"do": "ran", "file": self._file, "line": line, "column": column})
 
 
@@ -67,8 +67,8 @@ def _build_lookup(statement: ast.stmt) -> Iterator[ast.stmt]:
     match statement:
         case ast.ImportFrom(module="__future__") | ast.Expr(value=ast.Constant(value=str())):
             return
-    place = ast.Constant(statement.lineno * _LONGEST_LINE + statement.col_offset)
-    look = ast.Expr(ast.Subscript(ast.Name(_TABLE, ast.Load()), place, ast.Load()))
-    for node in ast.walk(look):
+    position = ast.Constant(statement.lineno * _LONGEST_LINE + statement.col_offset)
+    lookup = ast.Expr(ast.Subscript(ast.Name(_TABLE, ast.Load()), position, ast.Load()))
+    for node in ast.walk(lookup):
         ast.copy_location(node, statement)
-    yield look
+    yield lookup

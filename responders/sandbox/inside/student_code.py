@@ -38,9 +38,9 @@ class StudentFiles:
         self.main = main
         self.watch: StatementWatch | None = None  # only if executed statements are recorded
         self.imported: set[str] = set()
-        here = os.getcwd()
-        self._folder = f"{here}/" if here != "/" else None
-        folders = {here, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
+        folder = os.getcwd()
+        self._folder = f"{folder}/" if folder != "/" else None
+        folders = {folder, sys.prefix, sys.base_prefix, *sys.path, os.path.dirname(os.__file__)} - {"", "/"}
         # The longest first, because one may contain another.
         self._folders = [f"{folder}/" for folder in sorted(folders, key=len, reverse=True)]
 
@@ -84,18 +84,18 @@ class StudentFiles:
 
     def describe_error(self, error: BaseException) -> Frame:
         """Return the error as a frame: type, text, last student line on its way, and a hint."""
-        place: Frame = {"line": None, "file": None}
+        location: Frame = {"line": None, "file": None}
         if isinstance(error, SyntaxError) and error.filename is not None and self.has(error.filename):
-            place = self._build_place(error.filename, error.lineno)
-            words = error.msg or "invalid syntax"
+            location = self._build_place(error.filename, error.lineno)
+            text = error.msg or "invalid syntax"
         else:
             for frame, number in traceback.walk_tb(error.__traceback__):
                 if self.has(frame.f_code.co_filename):
-                    place = self._build_place(frame.f_code.co_filename, number)
-            words = _format_message(error)
-        told = {"type": type(error).__name__, "text": clip(self.remove_folders(words)), **place}
+                    location = self._build_place(frame.f_code.co_filename, number)
+            text = _format_message(error)
+        error_frame = {"type": type(error).__name__, "text": clip(self.remove_folders(text)), **location}
         hint = suggest_fix(error)
-        return {**told, "hint": hint} if hint else told
+        return {**error_frame, "hint": hint} if hint else error_frame
 
     def remove_folders(self, text: str) -> str:
         """Return ``text`` without the paths of this machine's modules and of the working folder."""
@@ -204,14 +204,14 @@ def install_warnings(tell: Callable[[str], None]) -> None:
 
     ``tell`` is called inside the code that warns.
     """
-    told: set[str] = set()
+    reported_warnings: set[str] = set()
 
     def show(
         message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
     ) -> None:
         sentence = f"{category.__name__}: {message}"
-        if sentence not in told and len(told) < _MOST_WARNINGS:
-            told.add(sentence)
+        if sentence not in reported_warnings and len(reported_warnings) < _MOST_WARNINGS:
+            reported_warnings.add(sentence)
             tell(clip(sentence, _LONGEST_WARNING))
 
     warnings.showwarning = show

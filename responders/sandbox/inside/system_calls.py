@@ -140,7 +140,7 @@ def _build_argument_rules(pid: int) -> tuple[ArgumentRule, ...]:
     dontneed, free, hugepage, nohugepage = 4, 8, 14, 15  # only for the process's own memory
     # A SIGKILL to itself would look like a host fault; queued signals are counted per user.
     signals = tuple(number for number in range(32) if number != signal.SIGKILL)
-    own = (0, pid)
+    own_ids = (0, pid)
     clocks = tuple(range(12))  # without clocks of processes or devices
     # Only addresses in private memory: other processes can wait at those of a shared file.
     futex_private, clock_realtime = 128, 256
@@ -154,10 +154,10 @@ def _build_argument_rules(pid: int) -> tuple[ArgumentRule, ...]:
         ArgumentRule(157, {0: (15, 16)}),  # prctl: the name
         ArgumentRule(158, {0: (arch_get_fs, arch_set_fs)}),
         ArgumentRule(316, {4: (0, rename_noreplace, rename_exchange)}),  # renameat2: the flags
-        ArgumentRule(302, {0: own}, zero=2),  # prlimit64: only reading; the argument is a pointer
-        ArgumentRule(124, {0: own}),  # getsid
-        ArgumentRule(140, {0: (0,), 1: own}),  # getpriority
-        *(ArgumentRule(number, {0: own}) for number in (143, 145, 204, 274)),  # sched_get*, get_robust_list
+        ArgumentRule(302, {0: own_ids}, zero=2),  # prlimit64: only reading; the argument is a pointer
+        ArgumentRule(124, {0: own_ids}),  # getsid
+        ArgumentRule(140, {0: (0,), 1: own_ids}),  # getpriority
+        *(ArgumentRule(number, {0: own_ids}) for number in (143, 145, 204, 274)),  # sched_get*, get_robust_list
         *(ArgumentRule(number, {0: clocks}) for number in (228, 229, 230)),  # clock_*
         ArgumentRule(202, {1: (*waits, *(clock_realtime | each for each in waits))}),  # futex
     )
@@ -203,15 +203,15 @@ def _restrict_to_call(number: int, body: list[Instruction]) -> list[Instruction]
 
 
 def _check_arguments(rule: ArgumentRule) -> list[Instruction]:
-    refused = (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)
+    refusal = (_RETURN, 0, 0, _RET_ERRNO | errno.EPERM)
     body: list[Instruction] = []
     if rule.zero is not None:
         for half in (0, 4):
-            body += [(_LOAD, 0, 0, _compute_argument_offset(rule.zero) + half), (_JUMP_EQUAL, 1, 0, 0), refused]
+            body += [(_LOAD, 0, 0, _compute_argument_offset(rule.zero) + half), (_JUMP_EQUAL, 1, 0, 0), refusal]
     for argument, values in rule.values.items():
         body.append((_LOAD, 0, 0, _compute_argument_offset(argument)))
         body += [(_JUMP_EQUAL, left, 0, value) for left, value in zip(range(len(values), 0, -1), values, strict=True)]
-        body.append(refused)
+        body.append(refusal)
     return [*body, (_RETURN, 0, 0, _RET_ALLOW)]
 
 

@@ -41,7 +41,7 @@ _KEPT_VARIABLES = (
 )
 
 
-def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
+def main(role_name: str, folders: str, exclusions: list[str], roots: list[str]) -> None:
     """Fork children as ordered on descriptor 3 until the worker closes it. Specs arrive on descriptor 4.
 
     The worker may close descriptor 3 before it reads a reply.
@@ -49,16 +49,16 @@ def main(role_name: str, folders: str, without: list[str], roots: list[str]) -> 
     Args:
         role_name: The role of the children.
         folders: The parent of private folders.
-        without: Modules that no child may have.
+        exclusions: Modules that no child may have.
         roots: Folders for imports.
     """
     try:
-        _run_zygote(role_name, folders, without, roots)
+        _run_zygote(role_name, folders, exclusions, roots)
     except ConnectionError:
         os._exit(0)
 
 
-def _run_zygote(role_name: str, folders: str, without: list[str], roots: list[str]) -> None:
+def _run_zygote(role_name: str, folders: str, exclusions: list[str], roots: list[str]) -> None:
     _raise_oom_score()
     prctl = ctypes.CDLL(None).prctl
     prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
@@ -80,31 +80,31 @@ def _run_zygote(role_name: str, folders: str, without: list[str], roots: list[st
     determinism.install_randomness(0)  # libraries draw random numbers while loading, which affects addresses
     for name in role.NEEDED:
         importlib.import_module(name)
-    closed = excluded_modules.exclude_modules(tuple(without))
-    readable = grants.list_readable_paths(roots, closed)
-    allowed = lockdown.Grants(
-        readable, grants.list_listable_folders(roots, closed), open_to_others=grants.is_open_to_others(readable)
+    closed_paths = excluded_modules.exclude_modules(tuple(exclusions))
+    readable = grants.list_readable_paths(roots, closed_paths)
+    permissions = lockdown.Grants(
+        readable, grants.list_listable_folders(roots, closed_paths), open_to_others=grants.is_open_to_others(readable)
     )
-    door = doorkeeper.start_doorkeeper(allowed, (control.fileno(), specs.fileno()))
-    role.preload(without)
-    prepared = child.ChildSetup(
-        allowed, lockdown.build_reading_rules(allowed), child.list_changed_signals(), os.getpid(), door.fileno()
+    door = doorkeeper.start_doorkeeper(permissions, (control.fileno(), specs.fileno()))
+    role.preload(exclusions)
+    setup = child.ChildSetup(
+        permissions, lockdown.build_reading_rules(permissions), child.list_changed_signals(), os.getpid(), door.fileno()
     )
-    with_libraries = role_name.endswith("with libraries")
-    run = role.run if with_libraries else functools.partial(libraries.run_without_libraries, role.run)
+    has_libraries = role_name.endswith("with libraries")
+    run = role.run if has_libraries else functools.partial(libraries.run_without_libraries, role.run)
     roles = {"role": run, "battery": battery.run}
-    kept = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
+    kept_variables = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
     os.environ.clear()
-    os.environ.update(kept, HOME="/")
+    os.environ.update(kept_variables, HOME="/")
     _check_single_thread()
     gc.collect()
     gc.disable()
     gc.freeze()
-    inside = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
-    _send_reply(control, {"ready": True}, [inside])
-    os.close(inside)
+    folders_descriptor = os.open(folders, os.O_RDONLY | os.O_DIRECTORY)
+    _send_reply(control, {"ready": True}, [folders_descriptor])
+    os.close(folders_descriptor)
     _practise_forks()
-    _serve_orders(control, functools.partial(_become_child, specs, roles, prepared))
+    _serve_orders(control, functools.partial(_become_child, specs, roles, setup))
     os._exit(0)
 
 
@@ -124,18 +124,18 @@ def _serve_orders(control: socket.socket, become_child: Callable[[], object]) ->
 
 def _practise_forks() -> None:
     """Fork children that end at once, so that effects of first calls on memory occur before any other child."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    receiver, sender = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for _ in range(_PRACTICE_FORKS):
-        theirs.send(bytes(4))
-        theirs.send(_ANY_CHILD)
-    theirs.shutdown(socket.SHUT_WR)
-    _serve_orders(ours, functools.partial(os._exit, 0))
-    ours.close()
-    theirs.close()
+        sender.send(bytes(4))
+        sender.send(_ANY_CHILD)
+    sender.shutdown(socket.SHUT_WR)
+    _serve_orders(receiver, functools.partial(os._exit, 0))
+    receiver.close()
+    sender.close()
 
 
 def _become_child(
-    specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], prepared: child.ChildSetup
+    specs: socket.socket, roles: Mapping[str, Callable[[Wire, lockdown.Grants], None]], setup: child.ChildSetup
 ) -> None:
     """Run a child in this process; never returns."""
     try:
@@ -145,7 +145,7 @@ def _become_child(
         _send_reply(specs, {"missing": f"pidfd_open: {error.strerror}"})
         os._exit(0)
     _send_reply(specs, {"pid": os.getpid()}, [pidfd])
-    child.run_child(spec, descriptors, roles[spec["work"]], prepared)
+    child.run_child(spec, descriptors, roles[spec["work"]], setup)
 
 
 def _reap(control: socket.socket, pid: int) -> None:

@@ -9,6 +9,6 @@ import typer
 AssignmentArgument = Annotated[str, typer.Argument(help="The assignment's id in the catalogue, or its folder.")]
 
 
-def format_count(number: int, one: str, many: str) -> str:
+def format_count(number: int, singular: str, plural: str) -> str:
     """Return the number with its noun: ``1 trial``, ``2 trials``."""
-    return f"{number} {one if number == 1 else many}"
+    return f"{number} {singular if number == 1 else plural}"

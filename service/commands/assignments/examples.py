@@ -34,27 +34,29 @@ def check_assignments(assignment: str | None, *, write_expected: bool) -> None:
     """
     with TrialRunner() as runner:
         if assignment is not None:
-            checked = [check_examples(assignment, runner=runner)]
+            checked_assignments = [check_examples(assignment, runner=runner)]
             if write_expected:
-                checked = [_write_expectations(assignment, checked[0])]
-            _show_checked(checked[0])
+                checked_assignments = [_write_expectations(assignment, checked_assignments[0])]
+            _show_checked(checked_assignments[0])
         else:
             names = track(list_catalogue_ids(), "grading", transient=True, console=create_progress_console())
-            checked = [check_examples(name, runner=runner) for name in names]
-            print_renderables(build_catalogue_table(checked))
-    statistics = compute_statistics(example.marked for each in checked for example in each.examples if example.marked)
+            checked_assignments = [check_examples(name, runner=runner) for name in names]
+            print_renderables(build_catalogue_table(checked_assignments))
+    statistics = compute_statistics(
+        example.marked for each in checked_assignments for example in each.examples if example.marked
+    )
     if assignment is not None:
         print_renderables(*build_statistics(statistics))
-    print_json(assignments=list(map(_checked_to_json, checked)), statistics=statistics)
-    for each in checked:
-        for warning in each.warnings:
-            print_note(f"robomark: {each.assignment.id}: {warning}")
-    problems = [f"{each.assignment.id}: {problem}" for each in checked for problem in each.problems]
+    print_json(assignments=list(map(_checked_to_json, checked_assignments)), statistics=statistics)
+    for checked_assignment in checked_assignments:
+        for warning in checked_assignment.warnings:
+            print_note(f"robomark: {checked_assignment.assignment.id}: {warning}")
+    problems = [f"{each.assignment.id}: {problem}" for each in checked_assignments for problem in each.problems]
     if problems:
         raise AssignmentError("\n".join(problems))
     if assignment is None:
-        count = sum(len(each.examples) for each in checked)
-        print_line(f"{len(checked)} assignments, {count} examples: all as expected")
+        count = sum(len(each.examples) for each in checked_assignments)
+        print_line(f"{len(checked_assignments)} assignments, {count} examples: all as expected")
 
 
 def _checked_to_json(checked: CheckedAssignment) -> dict[str, Any]:
@@ -92,11 +94,12 @@ def _write_expectations(assignment: str, checked: CheckedAssignment) -> CheckedA
 
 
 def _show_checked(checked: CheckedAssignment) -> None:
-    found = checked.assignment
-    criteria = format_count(len(found.criteria), "criterion", "criteria")
-    trials = format_count(found.trial_count, "trial", "trials")
+    assignment = checked.assignment
+    criteria = format_count(len(assignment.criteria), "criterion", "criteria")
+    trials = format_count(assignment.trial_count, "trial", "trials")
     print_line(
-        f"{found.id}: no problems; {criteria}, {found.max_marks:g} marks, {trials} (version {found.version[:12]})"
+        f"{assignment.id}: no problems; {criteria}, {assignment.max_marks:g} marks, {trials} (version "
+        f"{assignment.version[:12]})"
     )
     if checked.examples:
         print_renderables(build_examples_table(checked))

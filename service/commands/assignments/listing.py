@@ -12,7 +12,13 @@ def list_assignments() -> None:
     """The assignments of the catalogue."""
     assignments = [read_overview(locate_assignment_folder(name)) for name in list_catalogue_ids()]
     print_json(assignments=assignments)
-    listed = create_table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
-    for each in assignments:
-        listed.add_row(each.section, each.id, to_one_line(each.title), format_decimal(each.marks), str(each.trials))
-    print_renderables(listed)
+    table = create_table("section", "id", "title", "marks", "trials", right=("marks", "trials"))
+    for overview in assignments:
+        table.add_row(
+            overview.section,
+            overview.id,
+            to_one_line(overview.title),
+            format_decimal(overview.marks),
+            str(overview.trials),
+        )
+    print_renderables(table)

@@ -19,63 +19,68 @@ def show(assignment: AssignmentArgument) -> None:
     from service.reports.display_text import join_wrapped_lines, to_display_text, to_one_line
     from submissions.assignment.reader import find_assignment
 
-    found = find_assignment(assignment)
-    trials = {each.id: sum(trial.scenario is each for trial in found.trials()) for each in found.scenarios}
-    print_json(**_assignment_to_json(found, trials))
-    title = Text(to_one_line(found.title), style="bold")
-    show_parts(title.append(f" ({found.id}), {found.max_marks:g} marks", style="not bold"))
-    if found.description:
-        show_parts(Text(join_wrapped_lines(to_display_text(found.description.strip(), 20_000, lines=500))))
-    show_parts(f"\n{_describe_setting(found)}")
-    if found.given:
-        show_parts(f"given files: {', '.join(sorted(found.given))}")
+    definition = find_assignment(assignment)
+    trials = {each.id: sum(trial.scenario is each for trial in definition.trials()) for each in definition.scenarios}
+    print_json(**_assignment_to_json(definition, trials))
+    title = Text(to_one_line(definition.title), style="bold")
+    show_parts(title.append(f" ({definition.id}), {definition.max_marks:g} marks", style="not bold"))
+    if definition.description:
+        show_parts(Text(join_wrapped_lines(to_display_text(definition.description.strip(), 20_000, lines=500))))
+    show_parts(f"\n{_describe_setting(definition)}")
+    if definition.given:
+        show_parts(f"given files: {', '.join(sorted(definition.given))}")
     criteria = create_table("criterion", "check", "marks", right=("marks",))
-    for criterion in found.criteria:
+    for criterion in definition.criteria:
         criteria.add_row(to_one_line(criterion.title), criterion.check, f"{criterion.marks:g}")
     show_parts(criteria)
-    for scenario in found.scenarios:
-        counted = format_count(trials[scenario.id], "trial", "trials")
-        print_line(f"scenario {scenario.id}: {counted} of at most {scenario.seconds:g} s, {scenario.visibility}")
+    for scenario in definition.scenarios:
+        trial_count = format_count(trials[scenario.id], "trial", "trials")
+        print_line(f"scenario {scenario.id}: {trial_count} of at most {scenario.seconds:g} s, {scenario.visibility}")
 
 
-def _assignment_to_json(found: Assignment, trials: dict[str, int]) -> dict[str, object]:
+def _assignment_to_json(assignment: Assignment, trials: dict[str, int]) -> dict[str, object]:
     """Return the JSON value for an assignment."""
     return {
-        "id": found.id,
-        "title": found.title,
-        "section": found.section,
-        "description": found.description,
-        "version": found.version,
-        "marks": found.max_marks,
-        "background": found.world.background,
-        "robot": found.world.robot,
-        "program": found.parts.program,
-        "responder": found.parts.responder,
-        "given": sorted(found.given),
+        "id": assignment.id,
+        "title": assignment.title,
+        "section": assignment.section,
+        "description": assignment.description,
+        "version": assignment.version,
+        "marks": assignment.max_marks,
+        "background": assignment.world.background,
+        "robot": assignment.world.robot,
+        "program": assignment.parts.program,
+        "responder": assignment.parts.responder,
+        "given": sorted(assignment.given),
         "criteria": [
-            {"id": each.id, "title": each.title, "check": each.check, "marks": each.marks} for each in found.criteria
+            {"id": each.id, "title": each.title, "check": each.check, "marks": each.marks}
+            for each in assignment.criteria
         ],
         "scenarios": [
             {"id": each.id, "trials": trials[each.id], "seconds": each.seconds, "visibility": each.visibility}
-            for each in found.scenarios
+            for each in assignment.scenarios
         ],
     }
 
 
-def _describe_cell(which: str) -> str:
+def _describe_cell(cell_selector: str) -> str:
     """Describe which notebook cell contains the marked robot program."""
-    if which.isdecimal():
-        return f"robot program {which}"
-    return "the last robot program" if which == "last" else f'the cell tagged "{which.removeprefix("tag:")}"'
-
-
-def _describe_setting(found: Assignment) -> str:
-    if not found.scenarios:
-        return f"no robot is run; responder: {found.parts.responder}"
-    agents = "".join(f", {name}: {who}" for name, who in found.parts.agents.items())
-    noise = "" if found.world.noise == "course" else f", motor noise in {found.world.noise}"
+    if cell_selector.isdecimal():
+        return f"robot program {cell_selector}"
     return (
-        f"world: {found.world.background}, robot {found.world.robot}{noise}; "
-        f"program: {found.parts.program}, responder: {found.parts.responder}{agents}; "
-        f"of a notebook: {_describe_cell(found.parts.cell)}"
+        "the last robot program"
+        if cell_selector == "last"
+        else f'the cell tagged "{cell_selector.removeprefix("tag:")}"'
+    )
+
+
+def _describe_setting(assignment: Assignment) -> str:
+    if not assignment.scenarios:
+        return f"no robot is run; responder: {assignment.parts.responder}"
+    agents = "".join(f", {name}: {who}" for name, who in assignment.parts.agents.items())
+    noise = "" if assignment.world.noise == "course" else f", motor noise in {assignment.world.noise}"
+    return (
+        f"world: {assignment.world.background}, robot {assignment.world.robot}{noise}; "
+        f"program: {assignment.parts.program}, responder: {assignment.parts.responder}{agents}; "
+        f"of a notebook: {_describe_cell(assignment.parts.cell)}"
     )

@@ -41,9 +41,9 @@ def export(
     from submissions.assignment.export import export_all, export_for_students
 
     with user_permissions():
-        written = export_for_students(assignment, output) if student else export_all(assignment, output)
-    print_json(output=output, files=written)
-    print_line(f"{output}: {format_count(written, 'file', 'files')}")
+        file_count = export_for_students(assignment, output) if student else export_all(assignment, output)
+    print_json(output=output, files=file_count)
+    print_line(f"{output}: {format_count(file_count, 'file', 'files')}")
 
 
 def autograder(

@@ -36,41 +36,45 @@ def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | N
     Raises:
         UsageError: The options do not fit the format.
     """
-    chosen = FORMATS[form]
-    if output is None and (chosen.archive is not None or (chosen.table is None and chosen.document is not None)):
-        what = "a folder" if chosen.document is not None else "a file"
-        raise UsageError(f"{form} cannot be printed to a terminal; name {what} with --output")
-    if (chosen.worksheet is None) != (worksheet is None):
+    export_format = FORMATS[form]
+    if output is None and (
+        export_format.archive is not None or (export_format.table is None and export_format.document is not None)
+    ):
+        target_kind = "a folder" if export_format.document is not None else "a file"
+        raise UsageError(f"{form} cannot be printed to a terminal; name {target_kind} with --output")
+    if (export_format.worksheet is None) != (worksheet is None):
         raise UsageError("--worksheet and --format moodle-worksheet need each other; expected both or neither")
-    one_each = output is not None and _needs_separate_files(chosen, output)
-    asked = ExportRequest(form, published, None if worksheet is None else _read_worksheet(worksheet), one_each)
+    has_separate_files = output is not None and _needs_separate_files(export_format, output)
+    request = ExportRequest(
+        form, published, None if worksheet is None else _read_worksheet(worksheet), has_separate_files
+    )
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        if chosen.archive is not None and output is not None:
+        stored_batch = batches.find(service, actor, batch)
+        if export_format.archive is not None and output is not None:
             with user_permissions(), _open_file(output) as sink:
-                made = export(service, actor, found.course_id, found.id, asked, sink)
+                result = export(service, actor, stored_batch.course_id, stored_batch.id, request, sink)
         else:
-            made = export(service, actor, found.course_id, found.id, asked)
-    _warn_about_export(made)
-    if chosen.archive is not None:
-        _warn_about_omitted(made.left_over, "left out, because Moodle cannot match the student")
-    elif one_each and output is not None:
-        _write_files(made, output)
+            result = export(service, actor, stored_batch.course_id, stored_batch.id, request)
+    _warn_about_export(result)
+    if export_format.archive is not None:
+        _warn_about_omitted(result.left_over, "left out, because Moodle cannot match the student")
+    elif has_separate_files and output is not None:
+        _write_files(result, output)
     else:
         if worksheet is not None:
-            _warn_about_omitted(made.left_over, f"not in {worksheet.name}")
+            _warn_about_omitted(result.left_over, f"not in {worksheet.name}")
         if output is None:
-            sys.stdout.write(made.text)
+            sys.stdout.write(result.text)
         else:
-            _write_file(output, made.text)
+            _write_file(output, result.text)
 
 
-def _warn_about_export(made: Export) -> None:
-    for line in made.for_staff:
+def _warn_about_export(result: Export) -> None:
+    for line in result.for_staff:
         _warn(f"{line.student} is for staff only: {line.staff_only}; robomark show {line.id}")
-    if made.waiting_regrades:
-        _warn(f"{made.waiting_regrades} regrades are not published: these are the current grades")
-    if unjudged := describe_unjudged(made.unjudged):
+    if result.waiting_regrades:
+        _warn(f"{result.waiting_regrades} regrades are not published: these are the current grades")
+    if unjudged := describe_unjudged(result.unjudged):
         _warn(unjudged)
 
 
@@ -83,28 +87,28 @@ def _read_worksheet(worksheet: Path) -> str:
         raise UsageError(f"{worksheet} is not UTF-8; expected the file as downloaded from Moodle") from None
 
 
-def _needs_separate_files(chosen: Format, output: Path) -> bool:
+def _needs_separate_files(export_format: Format, output: Path) -> bool:
     """Return whether to write one file for each submission into the folder ``output``.
 
     The format must have a document for one grade. If it also has a table, ``output`` must be a folder, or must neither
     exist
     nor have a suffix.
     """
-    if chosen.document is None:
+    if export_format.document is None:
         return False
-    return chosen.table is None or output.is_dir() or (not output.suffix and not output.exists())
+    return export_format.table is None or output.is_dir() or (not output.suffix and not output.exists())
 
 
-def _write_files(made: Export, folder: Path) -> None:
+def _write_files(result: Export, folder: Path) -> None:
     try:
         with user_permissions():
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from None
-    for name, text in made.files:
+    for name, text in result.files:
         _write_file(folder / name, text)
-    print_json(output=folder, files=len(made.files))
-    print_line(f"{len(made.files)} files in {folder}")
+    print_json(output=folder, files=len(result.files))
+    print_line(f"{len(result.files)} files in {folder}")
 
 
 def _open_file(path: Path) -> BinaryIO:
@@ -122,10 +126,10 @@ def _write_file(path: Path, text: str) -> None:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def _warn_about_omitted(left_over: Sequence[str], why: str) -> None:
+def _warn_about_omitted(left_over: Sequence[str], reason: str) -> None:
     if left_over:
-        told = ", ".join(left_over[:_MOST_NAMED]) + (" ..." if len(left_over) > _MOST_NAMED else "")
-        _warn(f"{why}: {told}")
+        names = ", ".join(left_over[:_MOST_NAMED]) + (" ..." if len(left_over) > _MOST_NAMED else "")
+        _warn(f"{reason}: {names}")
 
 
 def _warn(sentence: str) -> None:

@@ -46,26 +46,26 @@ class BatchToSubmit:
     again: bool
 
 
-def submit(asked: BatchToSubmit) -> int:
+def submit(request: BatchToSubmit) -> int:
     """Queue submissions, print which services grade them, and return the number of rejected submissions."""
     with open_installation() as (service, actor):
-        done = _queue_submissions(service, actor, asked)
-        if done.batch is not None:
+        submitted_batch = _queue_submissions(service, actor, request)
+        if submitted_batch.batch is not None:
             print_note(_describe_workers(list_workers(service, actor)))
-    print_json(**_submitted_to_json(done))
-    return len(done.refusals)
+    print_json(**_submitted_to_json(submitted_batch))
+    return len(submitted_batch.refusals)
 
 
-def _describe_workers(lively: Sequence[WorkerDescription]) -> str:
-    if not lively:
+def _describe_workers(workers: Sequence[WorkerDescription]) -> str:
+    if not workers:
         return "no worker is running; start one with robomark worker or robomark up"
-    slots = sum(worker.concurrency for worker in lively)
-    many = f"{len(lively)} workers grade" if len(lively) > 1 else "1 worker grades"
-    return f"{many} them, concurrency {slots}"
+    slots = sum(worker.concurrency for worker in workers)
+    worker_text = f"{len(workers)} workers grade" if len(workers) > 1 else "1 worker grades"
+    return f"{worker_text} them, concurrency {slots}"
 
 
 def submit_and_grade(
-    services: GradingServices, service: Service, actor: Actor, asked: BatchToSubmit, output: Path | None
+    services: GradingServices, service: Service, actor: Actor, request: BatchToSubmit, output: Path | None
 ) -> int:
     """Queue submissions, wait until the services have graded them, and show the marks.
 
@@ -73,7 +73,7 @@ def submit_and_grade(
         services: The services that grade.
         service: The installation.
         actor: The user who submits.
-        asked: The command's options. With ``again``, known submissions are graded again. Otherwise their grades are
+        request: The command's options. With ``again``, known submissions are graded again. Otherwise their grades are
             shown.
         output: Folder for the reports, or None.
 
@@ -85,52 +85,65 @@ def submit_and_grade(
         HostError: A submission could not be graded.
         Cancelled: A job was cancelled meanwhile.
     """
-    done = _queue_submissions(replace(service, notifier=NullNotifier()), actor, asked)
-    own = [] if done.batch is None else [done.batch.id]
-    batch_ids = [*own, *(known.batch_id for known in done.known if known.batch_id)]
+    submitted_batch = _queue_submissions(replace(service, notifier=NullNotifier()), actor, request)
+    new_batch_ids = [] if submitted_batch.batch is None else [submitted_batch.batch.id]
+    batch_ids = [*new_batch_ids, *(known.batch_id for known in submitted_batch.known if known.batch_id)]
     try:
-        batch = services.notify_workers(service, actor, batch_ids, done.queued)
-        lines, statistics, page = _show_results(service, actor, batch, done, asked.path.name, output)
+        batch = services.notify_workers(service, actor, batch_ids, submitted_batch.queued)
+        lines, statistics, page = _show_results(service, actor, batch, submitted_batch, request.path.name, output)
     except KeyboardInterrupt:
-        where = f"status {done.batch.id}" if done.batch else "list"
-        raise Cancelled(f"stopped; ungraded submissions stay queued: robomark batch {where}") from None
-    print_json(**_submitted_to_json(done), jobs=lines, statistics=statistics, report=page)
-    failed = [line for line in lines if line.state is JobState.DEAD]
-    if failed:
-        raise HostError(f"{len(failed)} of {len(lines)} could not be graded; {failed[0].source}: {failed[0].error}")
-    cancelled = [line for line in lines if line.state is JobState.CANCELLED]
-    if cancelled:
-        raise Cancelled(f"{len(cancelled)} of {len(lines)} not graded; {cancelled[0].source}: {cancelled[0].error}")
-    return len(done.refusals)
+        command = f"status {submitted_batch.batch.id}" if submitted_batch.batch else "list"
+        raise Cancelled(f"stopped; ungraded submissions stay queued: robomark batch {command}") from None
+    print_json(**_submitted_to_json(submitted_batch), jobs=lines, statistics=statistics, report=page)
+    failed_lines = [line for line in lines if line.state is JobState.DEAD]
+    if failed_lines:
+        raise HostError(
+            f"{len(failed_lines)} of {len(lines)} could not be graded; {failed_lines[0].source}: "
+            f"{failed_lines[0].error}"
+        )
+    cancelled_lines = [line for line in lines if line.state is JobState.CANCELLED]
+    if cancelled_lines:
+        raise Cancelled(
+            f"{len(cancelled_lines)} of {len(lines)} not graded; {cancelled_lines[0].source}: "
+            f"{cancelled_lines[0].error}"
+        )
+    return len(submitted_batch.refusals)
 
 
-def _queue_submissions(service: Service, actor: Actor, asked: BatchToSubmit) -> SubmittedBatch:
+def _queue_submissions(service: Service, actor: Actor, request: BatchToSubmit) -> SubmittedBatch:
     """Queue the readable submissions and report how many are new."""
-    course_id = operations.resolve_course(service, actor, asked.course)
-    assignment = _resolve_assignment(service, actor, course_id, asked.assignment)
-    checked = read_batch_for(asked.path, assignment, None if asked.people is None else read_people(asked.people))
-    _show_refusals(checked.refusals)
-    if not checked.grading_requests:
-        raise UsageError(f"{asked.path}: none of {len(checked.refusals)} submissions can be accepted")
-    done = operations.submit(service, actor, course_id, SubmitRequest(asked.path.name, checked, asked.again))
-    _show_refusals(done.rejected_by_course)
-    if done.known:
-        known_ones = create_table("nothing new of", "why")
-        for known in done.known:
-            known_ones.add_row(known.student, f"already submitted as {known.job_id}{_suggest_command(known)}")
-        print_renderables(known_ones)
-    if done.batch is None:
+    course_id = operations.resolve_course(service, actor, request.course)
+    assignment = _resolve_assignment(service, actor, course_id, request.assignment)
+    batch_contents = read_batch_for(
+        request.path, assignment, None if request.people is None else read_people(request.people)
+    )
+    _show_refusals(batch_contents.refusals)
+    if not batch_contents.grading_requests:
+        raise UsageError(f"{request.path}: none of {len(batch_contents.refusals)} submissions can be accepted")
+    submitted_batch = operations.submit(
+        service, actor, course_id, SubmitRequest(request.path.name, batch_contents, request.again)
+    )
+    _show_refusals(submitted_batch.rejected_by_course)
+    if submitted_batch.known:
+        known_table = create_table("nothing new of", "why")
+        for known_submission in submitted_batch.known:
+            known_table.add_row(
+                known_submission.student,
+                f"already submitted as {known_submission.job_id}{_suggest_command(known_submission)}",
+            )
+        print_renderables(known_table)
+    if submitted_batch.batch is None:
         print_line("no new submissions; use --again to grade them again")
-        return done
-    alike = f"; {done.copied} identical to graded submissions" if done.copied else ""
-    print_line(f"batch {done.batch.id}: {done.queued} queued{alike}")
-    over = [job for job in done.jobs if job.staff_only]
-    if over:
-        for_staff = create_table("for staff only", "why")
-        for job in over:
-            for_staff.add_row(job.student, job.staff_only)
-        print_renderables(for_staff)
-    return done
+        return submitted_batch
+    copied_text = f"; {submitted_batch.copied} identical to graded submissions" if submitted_batch.copied else ""
+    print_line(f"batch {submitted_batch.batch.id}: {submitted_batch.queued} queued{copied_text}")
+    staff_only_jobs = [job for job in submitted_batch.jobs if job.staff_only]
+    if staff_only_jobs:
+        staff_table = create_table("for staff only", "why")
+        for job in staff_only_jobs:
+            staff_table.add_row(job.student, job.staff_only)
+        print_renderables(staff_table)
+    return submitted_batch
 
 
 def _resolve_assignment(service: Service, actor: Actor, course_id: int, name: str | None) -> Assignment | None:
@@ -145,26 +158,31 @@ def _resolve_assignment(service: Service, actor: Actor, course_id: int, name: st
     return operations.find_batch_assignment(service, actor, course_id, name)
 
 
-def _submitted_to_json(done: SubmittedBatch) -> dict[str, object]:
+def _submitted_to_json(submitted_batch: SubmittedBatch) -> dict[str, object]:
     """Return the JSON values for the accepted submissions."""
     return {
-        "batch": None if done.batch is None else done.batch.id,
-        "queued": done.queued,
-        "known": done.known,
-        "refusals": done.refusals,
+        "batch": None if submitted_batch.batch is None else submitted_batch.batch.id,
+        "queued": submitted_batch.queued,
+        "known": submitted_batch.known,
+        "refusals": submitted_batch.refusals,
     }
 
 
-def _suggest_command(known: KnownSubmission) -> str:
-    if known.state is JobState.DEAD:
-        return f", failed: robomark batch retry {known.batch_id}"
-    if known.other_grader and known.batch_id is not None:
-        return f", by another version of the grader: robomark batch regrade {known.batch_id}"
+def _suggest_command(known_submission: KnownSubmission) -> str:
+    if known_submission.state is JobState.DEAD:
+        return f", failed: robomark batch retry {known_submission.batch_id}"
+    if known_submission.other_grader and known_submission.batch_id is not None:
+        return f", by another version of the grader: robomark batch regrade {known_submission.batch_id}"
     return ""
 
 
 def _show_results(
-    service: Service, actor: Actor, batch: PendingBatches, done: SubmittedBatch, name: str, output: Path | None
+    service: Service,
+    actor: Actor,
+    batch: PendingBatches,
+    submitted_batch: SubmittedBatch,
+    name: str,
+    output: Path | None,
 ) -> tuple[list[JobLine], tuple[AssignmentStatistics, ...], Path | None]:
     """Wait for the marks, show those of new and known submissions, and write the reports."""
     # The services start during these imports.
@@ -176,14 +194,14 @@ def _show_results(
     if output is not None:
         html.preload_templates()
     batch.wait_for_marks()
-    lines = list_submitted(service, actor, done)
-    print_renderables(build_marks_table(lines, done.refusals))
+    lines = list_submitted(service, actor, submitted_batch)
+    print_renderables(build_marks_table(lines, submitted_batch.refusals))
     batch.wait_for_plots()
     statistics = show_statistics(service, actor, lines)
     print_renderables(*build_statistics(statistics))
     page = None
     if output is not None:
-        page = write_batch_reports(service.store, f"Batch {name}", lines, done.refusals, output)
+        page = write_batch_reports(service.store, f"Batch {name}", lines, submitted_batch.refusals, output)
         print_note(f"report: {page}")
     return lines, statistics, page
 

@@ -18,18 +18,18 @@ _MOST_NAMED = 10
 def summarize_jobs(line: BatchLine) -> str:
     """Return the number of jobs in each state as text."""
     if line.web_assignment is not None:
-        held = "open: " if line.takes_in else "closed: "
+        state_prefix = "open: " if line.takes_in else "closed: "
     else:
-        held = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
+        state_prefix = "" if line.state is BatchState.OPEN else f"{line.state.value}: "
     parts = [f"{line.states[state]} {state.value}" for state in JobState if line.states.get(state)]
-    return held + (", ".join(parts) or "empty")
+    return state_prefix + (", ".join(parts) or "empty")
 
 
 def list_remarks(line: JobLine) -> list[str]:
     """Return the remarks about a grade, for example ``2 days late`` or ``published``."""
     from service.operations.batch_views import format_days
 
-    told = {
+    remarks = {
         f"same as {line.copied_from}": line.copied_from is not None,
         f"{format_days(line.days_late)} late": line.days_late > 0 and line.staff_only is None,
         f"staff only: {line.staff_only}": line.staff_only is not None,
@@ -41,7 +41,7 @@ def list_remarks(line: JobLine) -> list[str]:
         f"attempt {line.newer_attempt} is newer and does not count": line.newer_attempt is not None,
         "published": line.published_at is not None,
     }
-    return [remark for remark, holds in told.items() if holds]
+    return [remark for remark, holds in remarks.items() if holds]
 
 
 def describe_unjudged(lines: Sequence[JobLine]) -> str:
@@ -49,13 +49,15 @@ def describe_unjudged(lines: Sequence[JobLine]) -> str:
     students = [line.student for line in lines if line.unjudged]
     if not students:
         return ""
-    told = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
-    whose = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
-    return f"{whose} criteria that could not be judged and give no marks: {told}; robomark show GRADE shows the reasons"
+    names = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
+    subject = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
+    return (
+        f"{subject} criteria that could not be judged and give no marks: {names}; robomark show GRADE shows the reasons"
+    )
 
 
-def format_marks(marks: Decimal | None, most: Decimal | None) -> str:
+def format_marks(marks: Decimal | None, maximum: Decimal | None) -> str:
     """Return the marks and the maximum, such as ``7 / 10``. Return an empty string without marks."""
     if marks is None:
         return ""
-    return f"{marks.normalize():f}" if most is None else f"{marks.normalize():f} / {most.normalize():f}"
+    return f"{marks.normalize():f}" if maximum is None else f"{marks.normalize():f} / {maximum.normalize():f}"

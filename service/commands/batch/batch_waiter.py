@@ -40,12 +40,12 @@ class _RateColumn(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         elapsed = task.elapsed or 0.0
-        done = task.completed - task.fields["before"]
-        if done <= 0 or elapsed <= 0 or task.total is None:
+        completed_jobs = task.completed - task.fields["before"]
+        if completed_jobs <= 0 or elapsed <= 0 or task.total is None:
             return Text("")
-        rate = done / elapsed
-        left = timedelta(seconds=round((task.total - task.completed) / rate))
-        return Text(f"{60 * rate:.0f} per minute, {left} left", style="progress.remaining")
+        rate = completed_jobs / elapsed
+        remaining_time = timedelta(seconds=round((task.total - task.completed) / rate))
+        return Text(f"{60 * rate:.0f} per minute, {remaining_time} left", style="progress.remaining")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +68,22 @@ class BatchWaiter:
 
     def wait_for_plots(self) -> None:
         """Wait until the plots of all graded jobs are drawn or given up."""
-        most = self._query_progress()[0].plots_due
-        self._wait("plots", lambda state: (max(most, state.plots_due), most - state.plots_due, 0.0))
+        plot_count = self._query_progress()[0].plots_due
+        self._wait("plots", lambda state: (max(plot_count, state.plots_due), plot_count - state.plots_due, 0.0))
 
     def _query_progress(self) -> tuple[BatchProgress, bool]:
         """Return the progress and True if the batch is paused. Each call takes time from the workers."""
-        far, state = poll_progress(self.service, self.actor, self.batch_id)
-        return far, state is BatchState.PAUSED
+        progress, state = poll_progress(self.service, self.actor, self.batch_id)
+        return progress, state is BatchState.PAUSED
 
-    def _wait(self, what: str, count: Callable[[BatchProgress], tuple[int, int, float]]) -> None:
+    def _wait(self, description: str, count: Callable[[BatchProgress], tuple[int, int, float]]) -> None:
         """Show a progress bar until everything is done.
 
         Args:
-            what: Label of the progress bar.
+            description: Label of the progress bar.
             count: Returns the total, the number of finished items, and the finished fraction of running items.
         """
-        total, before, _ = count(self._query_progress()[0])
+        total_count, initial_count, _ = count(self._query_progress()[0])
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -92,22 +92,22 @@ class BatchWaiter:
             TimeElapsedColumn(),
         )
         with Progress(*columns, console=self.console, transient=True) as bars:
-            bar = bars.add_task(what, total=total, completed=before, before=before)
-            begun, swept = time.monotonic(), float("-inf")
-            was_held = False
+            bar = bars.add_task(description, total=total_count, completed=initial_count, before=initial_count)
+            start_time, last_reap_time = time.monotonic(), float("-inf")
+            was_paused = False
             while True:
                 self.restart_stopped()
-                if time.monotonic() - swept >= _REAP_SECONDS:
+                if time.monotonic() - last_reap_time >= _REAP_SECONDS:
                     self.notifier.catch_up()
-                    swept = time.monotonic()
-                far, held = self._query_progress()
-                if held is not was_held:
-                    goes_on = f"is paused: robomark batch resume {self.batch_id}" if held else "goes on"
-                    print_note(f"batch {self.batch_id} {goes_on}")
-                    was_held = held
-                total, done, partial = count(far)
-                bars.update(bar, total=total, completed=min(done + partial, total))
-                if done >= total:
+                    last_reap_time = time.monotonic()
+                progress, is_paused = self._query_progress()
+                if is_paused is not was_paused:
+                    state_text = f"is paused: robomark batch resume {self.batch_id}" if is_paused else "goes on"
+                    print_note(f"batch {self.batch_id} {state_text}")
+                    was_paused = is_paused
+                total_count, completed_count, partial_count = count(progress)
+                bars.update(bar, total=total_count, completed=min(completed_count + partial_count, total_count))
+                if completed_count >= total_count:
                     return
-                waited = time.monotonic() - begun
-                time.sleep(min(max(_SHORTEST_QUERY_SECONDS, waited / _QUERIES_PER_WAIT), _LONGEST_QUERY_SECONDS))
+                waiting_time = time.monotonic() - start_time
+                time.sleep(min(max(_SHORTEST_QUERY_SECONDS, waiting_time / _QUERIES_PER_WAIT), _LONGEST_QUERY_SECONDS))

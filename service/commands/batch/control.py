@@ -18,11 +18,11 @@ def pause(batch: BatchId) -> None:
     from service.operations import batches as operations
 
     with open_installation() as (service, actor):
-        found = operations.find(service, actor, batch)
-        held = operations.pause(service, actor, found.course_id, found.id)
-    was = "is paused" if held.changed else "was paused already"
-    print_json(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    print_line(f"batch {found.id} {was}: {held.waiting} queued, {held.running} still running")
+        stored_batch = operations.find(service, actor, batch)
+        result = operations.pause(service, actor, stored_batch.course_id, stored_batch.id)
+    state_text = "is paused" if result.changed else "was paused already"
+    print_json(batch=stored_batch.id, changed=result.changed, waiting=result.waiting, running=result.running)
+    print_line(f"batch {stored_batch.id} {state_text}: {result.waiting} queued, {result.running} still running")
 
 
 def resume(batch: BatchId) -> None:
@@ -30,11 +30,11 @@ def resume(batch: BatchId) -> None:
     from service.operations import batches as operations
 
     with open_installation() as (service, actor):
-        found = operations.find(service, actor, batch)
-        held = operations.resume(service, actor, found.course_id, found.id)
-    was = "is resumed" if held.changed else "was not paused"
-    print_json(batch=found.id, changed=held.changed, waiting=held.waiting, running=held.running)
-    print_line(f"batch {found.id} {was}: {held.waiting} queued, {held.running} running")
+        stored_batch = operations.find(service, actor, batch)
+        result = operations.resume(service, actor, stored_batch.course_id, stored_batch.id)
+    state_text = "is resumed" if result.changed else "was not paused"
+    print_json(batch=stored_batch.id, changed=result.changed, waiting=result.waiting, running=result.running)
+    print_line(f"batch {stored_batch.id} {state_text}: {result.waiting} queued, {result.running} running")
 
 
 def cancel(batch: BatchId) -> None:
@@ -42,16 +42,17 @@ def cancel(batch: BatchId) -> None:
     from service.operations import batches as operations
 
     with open_installation() as (service, actor):
-        found = operations.find(service, actor, batch)
-        ended = operations.cancel(service, actor, found.course_id, found.id)
-    print_json(batch=found.id, changed=ended.changed, waiting=ended.waiting, running=ended.running)
-    if ended.changed:
+        stored_batch = operations.find(service, actor, batch)
+        result = operations.cancel(service, actor, stored_batch.course_id, stored_batch.id)
+    print_json(batch=stored_batch.id, changed=result.changed, waiting=result.waiting, running=result.running)
+    if result.changed:
         print_line(
-            f"batch {found.id} is cancelled: {ended.waiting} queued jobs cancelled, {ended.running} running jobs "
+            f"batch {stored_batch.id} is cancelled: {result.waiting} queued jobs cancelled, {result.running} "
+            "running jobs "
             "stopped"
         )
     else:
-        print_line(f"batch {found.id}: nothing changed, all its jobs have ended")
+        print_line(f"batch {stored_batch.id}: nothing changed, all its jobs have ended")
 
 
 def retry(
@@ -66,10 +67,10 @@ def retry(
     with open_installation() as (service, actor):
         batch_id = None if batch is None else operations.find(service, actor, batch).id
         retried = operations.retry_dead(service, actor, batch_id)
-    where = "all batches" if batch_id is None else f"batch {batch_id}"
+    scope = "all batches" if batch_id is None else f"batch {batch_id}"
     print_json(batch=batch_id, queued=retried.queued, outdated=retried.outdated)
     if retried.queued + retried.outdated == 0:
-        print_line(f"{where}: nothing changed, there are no failed jobs")
+        print_line(f"{scope}: nothing changed, there are no failed jobs")
         return
     outdated = f"; {retried.outdated} left out, because there is a newer submission" if retried.outdated else ""
-    print_line(f"{where}: {retried.queued} queued again{outdated}")
+    print_line(f"{scope}: {retried.queued} queued again{outdated}")

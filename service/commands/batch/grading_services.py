@@ -34,13 +34,13 @@ class PendingBatches:
 
     def wait_for_marks(self) -> None:
         """Wait until all jobs have ended."""
-        for each in self.waiters:
-            each.wait_for_marks()
+        for waiter in self.waiters:
+            waiter.wait_for_marks()
 
     def wait_for_plots(self) -> None:
         """Wait until all plots are drawn, then start stopping the services of this command."""
-        for each in self.waiters:
-            each.wait_for_plots()
+        for waiter in self.waiters:
+            waiter.wait_for_plots()
         self.stop_services()
 
 
@@ -77,14 +77,16 @@ class GradingServices:
     restart_stopped: Callable[[], None]
     stop: Callable[[], object]
 
-    def notify_workers(self, service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> PendingBatches:
+    def notify_workers(
+        self, service: Service, actor: Actor, batch_ids: Sequence[str], queued_count: int
+    ) -> PendingBatches:
         """Notify the workers and return the batches to wait for.
 
         Args:
             service: The installation.
             actor: The user who waits.
             batch_ids: Ids of the batches. Finished and paused batches are skipped.
-            new: Number of jobs that were just queued.
+            queued_count: Number of jobs that were just queued.
 
         Raises:
             HostError: Student code would run on this machine, but the sandbox cannot be set up.
@@ -105,12 +107,12 @@ class GradingServices:
                 # Check here to report the reason. Otherwise the user only sees that the worker stopped.
                 sandboxes.check_isolation()
         notifier = Notifier(make_celery(self.settings), service.store, self.settings)
-        notifier.grade(JobQueue.BATCH, new)
-        waiting = [
+        notifier.grade(JobQueue.BATCH, queued_count)
+        waiters = [
             BatchWaiter(service, actor, notifier, each, create_progress_console(), self.restart_stopped)
             for each in unfinished
         ]
-        return PendingBatches(waiting, self.stop)
+        return PendingBatches(waiters, self.stop)
 
 
 @contextmanager
@@ -123,14 +125,16 @@ def grading_services(service: Service) -> Iterator[GradingServices]:
     if settings.broker_url:
         yield GradingServices(settings, False, _do_nothing, _do_nothing)
         return
-    with EmbeddedServices(settings, service.store) as embedded, ThreadPoolExecutor(1) as beside:
-        end = partial(beside.submit, embedded.stop, _GRACE_SECONDS)
-        yield GradingServices(embedded.settings, True, embedded.ensure, end)
+    with EmbeddedServices(settings, service.store) as embedded, ThreadPoolExecutor(1) as executor:
+        stop = partial(executor.submit, embedded.stop, _GRACE_SECONDS)
+        yield GradingServices(embedded.settings, True, embedded.ensure, stop)
 
 
 @contextmanager
-def pending_batches(service: Service, actor: Actor, batch_ids: Sequence[str], new: int) -> Iterator[PendingBatches]:
-    """Notify the workers about ``new`` queued jobs and yield the batches to wait for.
+def pending_batches(
+    service: Service, actor: Actor, batch_ids: Sequence[str], queued_count: int
+) -> Iterator[PendingBatches]:
+    """Notify the workers about ``queued_count`` queued jobs and yield the batches to wait for.
 
     Services started here have stopped when the ``with`` block ends.
     """
@@ -138,7 +142,7 @@ def pending_batches(service: Service, actor: Actor, batch_ids: Sequence[str], ne
         yield PendingBatches((), _do_nothing)
         return
     with grading_services(service) as services:
-        yield services.notify_workers(service, actor, batch_ids, new)
+        yield services.notify_workers(service, actor, batch_ids, queued_count)
 
 
 def _list_unfinished(service: Service, actor: Actor, batch_ids: Sequence[str]) -> list[str]:
@@ -148,8 +152,8 @@ def _list_unfinished(service: Service, actor: Actor, batch_ids: Sequence[str]) -
 
     unfinished = []
     for batch_id in dict.fromkeys(batch_ids):
-        far, state = poll_progress(service, actor, batch_id)
-        if far.ended == far.jobs and not far.plots_due:
+        progress, state = poll_progress(service, actor, batch_id)
+        if progress.ended == progress.jobs and not progress.plots_due:
             continue
         if state is BatchState.OPEN:
             unfinished.append(batch_id)

@@ -19,11 +19,11 @@ def list_batches(
 
     with open_installation() as (service, actor):
         lines = list_newest(service, actor, course)
-    listed = create_table(
+    table = create_table(
         "batch", "name", "submitted", "submissions", "refused", "state", right=("submissions", "refused")
     )
     for line in lines:
-        when = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
-        listed.add_row(line.id, line.name, when, str(line.jobs), str(len(line.refusals)), summarize_jobs(line))
+        timestamp = line.created_at.astimezone().strftime("%Y-%m-%d %H:%M")
+        table.add_row(line.id, line.name, timestamp, str(line.jobs), str(len(line.refusals)), summarize_jobs(line))
     print_json(batches=lines)
-    print_renderables(listed)
+    print_renderables(table)

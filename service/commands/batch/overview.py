@@ -37,20 +37,22 @@ def show_overview(
     from service.operations import batch_views, batches
 
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        shown = batch_views.show_overview(service, actor, found.course_id, found.id, Decimal(pass_mark) / 100)
-    classes, refusals = shown.classes, shown.batch.refusals
-    print_json(batch=found.id, classes=classes, refusals=refusals, missing=shown.missing)
-    by_id = {line.id: line for line in shown.lines}
-    for each in classes:
-        print_renderables(*build_statistics([each.statistics]), _build_distribution(each))
-        print_line(f"{each.passed} of {each.statistics.n} have {pass_mark} % or more")
-        if each.outliers:
-            print_renderables(_build_outliers(each, by_id))
-        for same in each.identical:
-            print_line(f"identical: {format_names(tuple(line.student for line in same))}")
-        _print_missing(each.missing)
-    _print_missing(shown.missing)
+        stored_batch = batches.find(service, actor, batch)
+        overview = batch_views.show_overview(
+            service, actor, stored_batch.course_id, stored_batch.id, Decimal(pass_mark) / 100
+        )
+    classes, refusals = overview.classes, overview.batch.refusals
+    print_json(batch=stored_batch.id, classes=classes, refusals=refusals, missing=overview.missing)
+    lines_by_id = {line.id: line for line in overview.lines}
+    for class_overview in classes:
+        print_renderables(*build_statistics([class_overview.statistics]), _build_distribution(class_overview))
+        print_line(f"{class_overview.passed} of {class_overview.statistics.n} have {pass_mark} % or more")
+        if class_overview.outliers:
+            print_renderables(_build_outliers(class_overview, lines_by_id))
+        for identical_lines in class_overview.identical:
+            print_line(f"identical: {format_names(tuple(line.student for line in identical_lines))}")
+        _print_missing(class_overview.missing)
+    _print_missing(overview.missing)
     for refusal in refusals:
         print_line(f"rejected: {refusal.source}: {refusal.reason}")
 
@@ -60,17 +62,17 @@ def _print_missing(students: Sequence[Student]) -> None:
         print_line(f"not submitted: {format_names(tuple(student.name or student.id for student in students))}")
 
 
-def _build_distribution(each: ClassOverview) -> Table:
-    made = create_table("marks", "students", right=("students",))
-    for place, bin_ in enumerate(each.distribution, start=1):
+def _build_distribution(class_overview: ClassOverview) -> Table:
+    table = create_table("marks", "students", right=("students",))
+    for number, bin_ in enumerate(class_overview.distribution, start=1):
         low, high = (f"{edge.normalize():f}" for edge in (bin_.low, bin_.high))
-        marks = f"{low} (all)" if place == len(each.distribution) else f"{low} to below {high}"
-        made.add_row(marks, str(bin_.count))
-    return made
+        marks = f"{low} (all)" if number == len(class_overview.distribution) else f"{low} to below {high}"
+        table.add_row(marks, str(bin_.count))
+    return table
 
 
-def _build_outliers(each: ClassOverview, by_id: dict[str, TableLine]) -> Table:
-    made = create_table("needs review", "why", "grade")
-    for outlier in each.outliers:
-        made.add_row(by_id[outlier.id].student, _OUTLIER_REASONS[outlier.why], outlier.id)
-    return made
+def _build_outliers(class_overview: ClassOverview, lines_by_id: dict[str, TableLine]) -> Table:
+    table = create_table("needs review", "why", "grade")
+    for outlier in class_overview.outliers:
+        table.add_row(lines_by_id[outlier.id].student, _OUTLIER_REASONS[outlier.why], outlier.id)
+    return table

@@ -34,30 +34,35 @@ def regrade(
     from service.operations import regrades as operations
     from service.operations.types import JobState
 
-    changed = _resolve_assignment(assignment)
+    changed_assignment = _resolve_assignment(assignment)
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        by = replace(service, notifier=NullNotifier()) if wait else service
-        made = operations.regrade_batch(by, actor, found.course_id, found.id, changed)
-        print_line(f"batch {made.batch_id}: {made.jobs} queued for regrading{_describe_omitted(made)}")
+        stored_batch = batches.find(service, actor, batch)
+        regrade_service = replace(service, notifier=NullNotifier()) if wait else service
+        new_batch = operations.regrade_batch(
+            regrade_service, actor, stored_batch.course_id, stored_batch.id, changed_assignment
+        )
+        print_line(f"batch {new_batch.batch_id}: {new_batch.jobs} queued for regrading{_describe_omitted(new_batch)}")
         if not wait:
-            print_note(f"changes and reasons: robomark batch status {made.batch_id}")
-            print_json(batch=made.batch_id, regraded=made)
+            print_note(f"changes and reasons: robomark batch status {new_batch.batch_id}")
+            print_json(batch=new_batch.batch_id, regraded=new_batch)
             return
         from service.commands.batch.tables import build_changes_table
         from service.queue.logs import configure_logging
 
         configure_logging(service.settings.log_level)
-        with pending_batches(service, actor, [made.batch_id], made.jobs) as regraded:
-            regraded.wait_for_marks()
-            changes = operations.list_changes(service, actor, found.course_id, made.batch_id)
+        with pending_batches(service, actor, [new_batch.batch_id], new_batch.jobs) as pending_regrade:
+            pending_regrade.wait_for_marks()
+            changes = operations.list_changes(service, actor, stored_batch.course_id, new_batch.batch_id)
             print_renderables(build_changes_table(changes))
-            print_note(f"to publish the new grades: robomark batch publish {made.batch_id}")
-            regraded.wait_for_plots()
-    print_json(batch=made.batch_id, regraded=made, changes=changes)
-    dead = [change for change in changes if change.state is JobState.DEAD]
-    if dead:
-        raise HostError(f"{len(dead)} of {len(changes)} could not be graded; {dead[0].student}: {dead[0].reason}")
+            print_note(f"to publish the new grades: robomark batch publish {new_batch.batch_id}")
+            pending_regrade.wait_for_plots()
+    print_json(batch=new_batch.batch_id, regraded=new_batch, changes=changes)
+    failed_changes = [change for change in changes if change.state is JobState.DEAD]
+    if failed_changes:
+        raise HostError(
+            f"{len(failed_changes)} of {len(changes)} could not be graded; {failed_changes[0].student}: "
+            f"{failed_changes[0].reason}"
+        )
 
 
 def publish(
@@ -71,10 +76,12 @@ def publish(
     from service.operations import regrades as operations
 
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        done = operations.publish(service, actor, found.course_id, found.id, anyway=anyway)
-    print_json(batch=found.id, published=done)
-    _print_published(f"batch {found.id}", done)
+        stored_batch = batches.find(service, actor, batch)
+        publication = operations.publish(
+            service, actor, stored_batch.course_id, stored_batch.id, includes_unjudged=anyway
+        )
+    print_json(batch=stored_batch.id, published=publication)
+    _print_published(f"batch {stored_batch.id}", publication)
 
 
 def publish_one(
@@ -88,10 +95,12 @@ def publish_one(
     from service.operations import regrades as operations
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        done = operations.publish_one(service, actor, found.course_id, found.id, anyway=anyway)
-    print_json(grade=found.id, published=done)
-    _print_published(f"grade {found.id}", done)
+        stored_grade = batches.find_grade(service, actor, grade)
+        publication = operations.publish_one(
+            service, actor, stored_grade.course_id, stored_grade.id, includes_unjudged=anyway
+        )
+    print_json(grade=stored_grade.id, published=publication)
+    _print_published(f"grade {stored_grade.id}", publication)
 
 
 def regrade_one(
@@ -104,12 +113,12 @@ def regrade_one(
     from service.operations import batches
     from service.operations import regrades as operations
 
-    changed = _resolve_assignment(assignment)
+    changed_assignment = _resolve_assignment(assignment)
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        job = operations.regrade_one(service, actor, found.course_id, found.id, changed)
-    print_json(grade=found.id, job=job)
-    print_line(f"grade {found.id}: queued for regrading as {job}")
+        stored_grade = batches.find_grade(service, actor, grade)
+        job = operations.regrade_one(service, actor, stored_grade.course_id, stored_grade.id, changed_assignment)
+    print_json(grade=stored_grade.id, job=job)
+    print_line(f"grade {stored_grade.id}: queued for regrading as {job}")
     print_note(f"to publish the new grade: robomark batch publish-one {job}")
 
 
@@ -119,10 +128,10 @@ def grade_over_limit(grade: GradeId) -> None:
     from service.operations import regrades as operations
 
     with open_installation() as (service, actor):
-        found = batches.find_grade(service, actor, grade)
-        operations.grade_over_limit(service, actor, found.course_id, found.id)
-    print_json(grade=found.id)
-    print_line(f"grade {found.id} is queued")
+        stored_grade = batches.find_grade(service, actor, grade)
+        operations.grade_over_limit(service, actor, stored_grade.course_id, stored_grade.id)
+    print_json(grade=stored_grade.id)
+    print_line(f"grade {stored_grade.id} is queued")
 
 
 def preview_publication(batch: BatchId) -> None:
@@ -131,10 +140,12 @@ def preview_publication(batch: BatchId) -> None:
     from service.operations import regrades as operations
 
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        would = operations.preview_publication(service, actor, found.course_id, found.id)
-    print_json(batch=found.id, publication=would.counts, students=would.students)
-    print_line(f"batch {found.id}, {would.students} students: {_describe_published(would.counts, 'to publish')}")
+        stored_batch = batches.find(service, actor, batch)
+        preview = operations.preview_publication(service, actor, stored_batch.course_id, stored_batch.id)
+    print_json(batch=stored_batch.id, publication=preview.counts, students=preview.students)
+    print_line(
+        f"batch {stored_batch.id}, {preview.students} students: {_describe_published(preview.counts, 'to publish')}"
+    )
 
 
 def _resolve_assignment(name: str | None) -> Assignment | str:
@@ -147,30 +158,33 @@ def _resolve_assignment(name: str | None) -> Assignment | str:
     return find_assignment(name) if Path(name).exists() and name not in list_catalogue_ids() else name
 
 
-def _print_published(of_what: str, done: PublicationCounts) -> None:
-    print_line(f"{of_what}: {_describe_published(done, 'published')}")
+def _print_published(subject: str, publication: PublicationCounts) -> None:
+    print_line(f"{subject}: {_describe_published(publication, 'published')}")
 
 
-def _describe_published(done: PublicationCounts, verb: str) -> str:
+def _describe_published(publication: PublicationCounts, verb: str) -> str:
     """Return a sentence with the number of published grades and of those held back, with reasons."""
-    left = [
+    omissions = [
         f"{count} {what}"
         for count, what in (
-            (done.unfinished, "not graded yet"),
-            (done.dead, "could not be graded"),
-            (done.staff_only, "over a limit and for staff only"),
-            (done.unjudged, "with criteria that could not be judged (--anyway publishes them)"),
+            (publication.unfinished, "not graded yet"),
+            (publication.dead, "could not be graded"),
+            (publication.staff_only, "over a limit and for staff only"),
+            (publication.unjudged, "with criteria that could not be judged (--anyway publishes them)"),
         )
         if count
     ]
-    replaced = f", {done.replaced} of them regrades" if done.replaced else ""
-    return f"{done.published} grades {verb}{replaced}{'; not published: ' if left else ''}{', '.join(left)}"
+    replaced = f", {publication.replaced} of them regrades" if publication.replaced else ""
+    return (
+        f"{publication.published} grades "
+        f"{verb}{replaced}{'; not published: ' if omissions else ''}{', '.join(omissions)}"
+    )
 
 
-def _describe_omitted(made: RegradeBatch) -> str:
-    left = []
-    if made.other_assignment:
-        left.append(f"{made.other_assignment} left out, for another assignment")
-    if made.unfinished:
-        left.append(f"{made.unfinished} left out, not graded yet")
-    return "".join(f"; {sentence}" for sentence in left)
+def _describe_omitted(new_batch: RegradeBatch) -> str:
+    omissions = []
+    if new_batch.other_assignment:
+        omissions.append(f"{new_batch.other_assignment} left out, for another assignment")
+    if new_batch.unfinished:
+        omissions.append(f"{new_batch.unfinished} left out, not graded yet")
+    return "".join(f"; {sentence}" for sentence in omissions)

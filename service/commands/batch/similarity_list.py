@@ -24,12 +24,12 @@ from service.reports.view import SimilarityView, build_similarity_view
 _MOST_SHOWN = 100
 
 
-def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
+def find_similar(batch: str, given_path: Path | None, output: Path | None) -> None:
     """Print the similar pairs and write the page with the evidence.
 
     Args:
         batch: Batch id, or the beginning of it.
-        given: File or folder of Python code to ignore, because students received it.
+        given_path: File or folder of Python code to ignore, because students received it.
         output: Page to write, or None.
 
     Raises:
@@ -38,11 +38,13 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
     if output is not None:
         prepare_folder(output)
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        shown = show_similar_in_batch(service, actor, found.course_id, found.id, given)
-        view = build_similarity_view(shown.found or ())
+        stored_batch = batches.find(service, actor, batch)
+        findings = show_similar_in_batch(service, actor, stored_batch.course_id, stored_batch.id, given_path)
+        view = build_similarity_view(findings.found or ())
         if output is not None:
-            page = render_similarity_page(view, shown.source, f"Similar submissions in {shown.batch.name}", _MOST_SHOWN)
+            page = render_similarity_page(
+                view, findings.source, f"Similar submissions in {findings.batch.name}", _MOST_SHOWN
+            )
             path = write_page(output, "similar.html", page)
             print_note(f"evidence: {path}")
     print_json(assignments=similarity_to_json(view))
@@ -50,15 +52,15 @@ def find_similar(batch: str, given: Path | None, output: Path | None) -> None:
 
 
 def _show_similarity(view: SimilarityView) -> None:
-    for found in view.found:
-        print_line(describe_similarity(found))
-        for kind, groups in (("the same file", found.same), ("the same recordings", found.same_recordings)):
+    for similarity in view.found:
+        print_line(describe_similarity(similarity))
+        for kind, groups in (("the same file", similarity.same), ("the same recordings", similarity.same_recordings)):
             for group in groups[:_MOST_SHOWN]:
                 print_line(f"{kind}: {', '.join(group)}")
-        alike = create_table("student", "student", "alike", "where", "same behaviour")
-        for row in build_similarity_rows(found)[:_MOST_SHOWN]:
-            alike.add_row(*row)
-        if found.pairs:
-            print_renderables(alike)
-        if len(found.pairs) > _MOST_SHOWN:
-            print_line(f"{len(found.pairs) - _MOST_SHOWN} more pairs are not shown; --json shows all")
+        table = create_table("student", "student", "alike", "where", "same behaviour")
+        for row in build_similarity_rows(similarity)[:_MOST_SHOWN]:
+            table.add_row(*row)
+        if similarity.pairs:
+            print_renderables(table)
+        if len(similarity.pairs) > _MOST_SHOWN:
+            print_line(f"{len(similarity.pairs) - _MOST_SHOWN} more pairs are not shown; --json shows all")

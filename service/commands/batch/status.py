@@ -21,33 +21,33 @@ def status(batch: BatchId) -> None:
     from service.operations.batch_views import show_status
 
     with open_installation() as (service, actor):
-        found = batches.find(service, actor, batch)
-        shown = show_status(service, actor, found.course_id, found.id)
-    graded, line, pace = shown.graded, shown.graded.view.batch, shown.graded.view.pace
+        stored_batch = batches.find(service, actor, batch)
+        batch_status = show_status(service, actor, stored_batch.course_id, stored_batch.id)
+    grading, line, pace = batch_status.graded, batch_status.graded.view.batch, batch_status.graded.view.pace
     print_json(
         batch=line,
         pace=pace,
-        jobs=graded.lines,
-        changes=shown.changes,
-        ranks=shown.ranks,
-        unpublished_regrades=graded.waiting_regrades,
-        statistics=graded.statistics,
-        history=shown.history,
+        jobs=grading.lines,
+        changes=batch_status.changes,
+        ranks=batch_status.ranks,
+        unpublished_regrades=grading.waiting_regrades,
+        statistics=grading.statistics,
+        history=batch_status.history,
     )
     print_line(f"batch {line.id}: {line.name}: {summarize_jobs(line)}")
     if pace is not None:
         print_line(f"{pace.per_minute:.0f} per minute, {pace.left} left")
     print_renderables(
-        build_marks_table(graded.lines, line.refusals)
+        build_marks_table(grading.lines, line.refusals)
         if line.regrade_of is None
-        else build_changes_table(shown.changes)
+        else build_changes_table(batch_status.changes)
     )
-    print_renderables(*map(build_rank_table, shown.ranks), *build_statistics(graded.statistics))
-    if unjudged := describe_unjudged(graded.lines):
+    print_renderables(*map(build_rank_table, batch_status.ranks), *build_statistics(grading.statistics))
+    if unjudged := describe_unjudged(grading.lines):
         print_line(unjudged)
-    if graded.waiting_regrades:
+    if grading.waiting_regrades:
         print_line(
-            f"{graded.waiting_regrades} regrades are completed but not published: robomark batch publish {line.id}"
+            f"{grading.waiting_regrades} regrades are completed but not published: robomark batch publish {line.id}"
         )
-    if shown.history:
-        print_renderables(build_history_table(shown.history))
+    if batch_status.history:
+        print_renderables(build_history_table(batch_status.history))

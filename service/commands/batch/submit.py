@@ -42,18 +42,18 @@ def submit(
     graded.
     """
     if wait or output is not None:
-        refused = submit_and_wait(
+        rejected_count = submit_and_wait(
             grading_requests, assignment, output=output, again=again, people=people, course=course
         )
     else:
         from service.commands.batch import batch_submission
 
-        refused = batch_submission.submit(
+        rejected_count = batch_submission.submit(
             batch_submission.BatchToSubmit(grading_requests, assignment, people, course, again)
         )
-    if refused:
-        what = "submission was" if refused == 1 else "submissions were"
-        raise UsageError(f"{refused} {what} rejected; the others are queued")
+    if rejected_count:
+        subject = "submission was" if rejected_count == 1 else "submissions were"
+        raise UsageError(f"{rejected_count} {subject} rejected; the others are queued")
 
 
 def submit_and_wait(

@@ -32,35 +32,35 @@ def build_marks_table(lines: Sequence[JobLine], refusals: Sequence[RejectedSubmi
 
     The columns are marks, accuracy, verdict and remarks.
     """
-    named = any(line.name not in ("", line.student) for line in lines)
-    headings = ("student", *(["name"] if named else []), "assignment", "marks", "accuracy", "verdict", "grade")
-    made = create_table(*headings, right=("marks", "accuracy"))
+    has_names = any(line.name not in ("", line.student) for line in lines)
+    headings = ("student", *(["name"] if has_names else []), "assignment", "marks", "accuracy", "verdict", "grade")
+    table = create_table(*headings, right=("marks", "accuracy"))
 
-    def who(student: str, name: str, assignment: str) -> list[str]:
-        return [student, *([name] if named else []), assignment]
+    def format_student(student: str, name: str, assignment: str) -> list[str]:
+        return [student, *([name] if has_names else []), assignment]
 
     for line in lines:
         accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
         outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
-        made.add_row(
-            *who(line.student, line.name, line.assignment),
+        table.add_row(
+            *format_student(line.student, line.name, line.assignment),
             format_marks(line.marks, line.max_marks),
             accuracy,
             Text("; ".join([outcome, *list_remarks(line)]), style=_STYLES.get(line.state, "")),
             line.id,
         )
     for refusal in refusals:
-        whose = who(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
-        made.add_row(*whose, "", "", Text(f"rejected: {refusal.sentence}", style="red"), "")
-    return made
+        student_cells = format_student(refusal.student.id or refusal.source, refusal.student.name, refusal.assignment)
+        table.add_row(*student_cells, "", "", Text(f"rejected: {refusal.sentence}", style="red"), "")
+    return table
 
 
 def build_refusals_table(refusals: Sequence[RejectedSubmission]) -> Table:
     """Return a table of rejected submissions with reasons."""
-    made = create_table("rejected", "why")
+    table = create_table("rejected", "why")
     for refusal in refusals:
-        made.add_row(refusal.source, refusal.reason)
-    return made
+        table.add_row(refusal.source, refusal.reason)
+    return table
 
 
 def build_changes_table(changes: Sequence[Change]) -> RenderableType:
@@ -68,12 +68,12 @@ def build_changes_table(changes: Sequence[Change]) -> RenderableType:
 
     A line below the table counts the other submissions.
     """
-    made = create_table(
+    table = create_table(
         "student", "before", "after", "criteria that changed", "why", "grade", right=("before", "after")
     )
-    shown = [change for change in changes if _needs_row(change)]
-    for change in shown:
-        made.add_row(
+    shown_changes = [change for change in changes if _needs_row(change)]
+    for change in shown_changes:
+        table.add_row(
             change.student,
             format_marks(change.before, change.before_max),
             format_marks(change.after, change.after_max),
@@ -81,29 +81,29 @@ def build_changes_table(changes: Sequence[Change]) -> RenderableType:
             Text(change.reason, style=_STYLES.get(change.state, "")),
             change.job_id,
         )
-    same = len(changes) - len(shown)
-    standing = sum(change.standing is Standing.STANDS for change in changes)
-    told = f"{same} of {len(changes)} unchanged; {standing} new grades are current"
-    return Group(made, told) if shown else told
+    unchanged_count = len(changes) - len(shown_changes)
+    current_count = sum(change.standing is Standing.STANDS for change in changes)
+    summary = f"{unchanged_count} of {len(changes)} unchanged; {current_count} new grades are current"
+    return Group(table, summary) if shown_changes else summary
 
 
 def build_rank_table(ranks: RankTable) -> RenderableType:
     """Return a table with one row for each student, best first."""
     measure = ", ".join(filter(None, (ranks.measure, ranks.unit)))
-    made = create_table("place", "student", measure, "95 % interval", "counted trials", right=("place", measure))
+    table = create_table("place", "student", measure, "95 % interval", "counted trials", right=("place", measure))
     for row in ranks.texts:
-        made.add_row(*row)
-    return Group(f"{ranks.assignment}: {ranks.title}", made)
+        table.add_row(*row)
+    return Group(f"{ranks.assignment}: {ranks.title}", table)
 
 
 def build_history_table(history: Sequence[AuditEntry]) -> Table:
     """Return a table of the activity log."""
-    made = create_table("when", "who", "did", "outcome")
+    table = create_table("when", "who", "did", "outcome")
     for entry in history:
         detail = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in entry.detail.items())
-        when = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
-        made.add_row(when, entry.actor, entry.action, detail)
-    return made
+        timestamp = entry.at.astimezone().strftime("%Y-%m-%d %H:%M")
+        table.add_row(timestamp, entry.actor, entry.action, detail)
+    return table
 
 
 def _needs_row(change: Change) -> bool:
@@ -111,5 +111,7 @@ def _needs_row(change: Change) -> bool:
 
 
 def _format_criterion_change(change: CriterionChange) -> str:
-    before, after = (format_marks(*worth) if worth is not None else "none" for worth in (change.before, change.after))
-    return f"{change.title}: {before} to {after}{' (adjusted by staff)' if change.by_hand else ''}"
+    old_marks, new_marks = (
+        format_marks(*worth) if worth is not None else "none" for worth in (change.before, change.after)
+    )
+    return f"{change.title}: {old_marks} to {new_marks}{' (adjusted by staff)' if change.by_hand else ''}"

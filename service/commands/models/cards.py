@@ -22,13 +22,13 @@ def list_models() -> None:
     cards = [load_card(name) for name in list_classifier_names()]
     print_json(models=[_card_to_json(about) for about in cards])
     numbers = ("trained on", "right", "95 % interval", "of")
-    listed = create_table("name", "file", *numbers, right=numbers)
-    for about in cards:
-        accuracy = about.measured.accuracy
+    table = create_table("name", "file", *numbers, right=numbers)
+    for card in cards:
+        accuracy = card.measured.accuracy
         share = f"{accuracy.share:.3f}"
         interval = format_interval(accuracy)
-        listed.add_row(about.name, about.file, str(about.training_images), share, interval, str(accuracy.n))
-    print_renderables(listed)
+        table.add_row(card.name, card.file, str(card.training_images), share, interval, str(accuracy.n))
+    print_renderables(table)
 
 
 def compare(
@@ -37,56 +37,58 @@ def compare(
 ) -> None:
     """Compare the cards of classifiers: the accuracy of each, with 95 % intervals."""
     with user_permissions():
-        about = [load_card(name) for name in chosen]
-        if len({each.classes for each in about}) > 1 or len(set(chosen)) < 2:
+        cards = [load_card(name) for name in chosen]
+        if len({each.classes for each in cards}) > 1 or len(set(chosen)) < 2:
             raise UsageError(f"{', '.join(chosen)} cannot be compared; expected two or more models of the same classes")
     if output is not None:
         from service.reports.output_files import prepare_folder
 
         prepare_folder(output)
-    print_json(models=[_card_to_json(each) for each in about], curves=_find_common_curves(about))
-    print_renderables(_build_comparison_table("", [("accuracy", [each.measured.accuracy for each in about])], chosen))
-    for curves in _find_common_curves(about):
-        first = curves[0]
-        rows = [(f"{value:g}", [curve.tallies[at] for curve in curves]) for at, value in enumerate(first.values)]
-        print_renderables("", _build_comparison_table(f"{first.varied} ({first.unit}): {first.under}", rows, chosen))
+    print_json(models=[_card_to_json(each) for each in cards], curves=_find_common_curves(cards))
+    print_renderables(_build_comparison_table("", [("accuracy", [each.measured.accuracy for each in cards])], chosen))
+    for curves in _find_common_curves(cards):
+        first_curve = curves[0]
+        rows = [(f"{value:g}", [curve.tallies[at] for curve in curves]) for at, value in enumerate(first_curve.values)]
+        print_renderables(
+            "", _build_comparison_table(f"{first_curve.varied} ({first_curve.unit}): {first_curve.under}", rows, chosen)
+        )
     if output is not None:
         from service.reports.plots.evaluation import render_comparison_plot
 
-        write_output(output / f"{'-and-'.join(chosen)}.png", render_comparison_plot(chosen, _find_common_curves(about)))
+        write_output(output / f"{'-and-'.join(chosen)}.png", render_comparison_plot(chosen, _find_common_curves(cards)))
 
 
-def _card_to_json(about: Card) -> dict[str, Any]:
+def _card_to_json(card: Card) -> dict[str, Any]:
     """Return the JSON value for a model card."""
-    accuracy = about.measured.accuracy
+    accuracy = card.measured.accuracy
     low, high = accuracy.interval
     return {
-        "name": about.name,
-        "file": about.file,
-        "training_images": about.training_images,
-        "classes": about.classes,
+        "name": card.name,
+        "file": card.file,
+        "training_images": card.training_images,
+        "classes": card.classes,
         "accuracy": {"value": accuracy.share, "low": low, "high": high, "n": accuracy.n},
     }
 
 
-def _find_common_curves(about: Sequence[Card]) -> list[list[CardCurve]]:
+def _find_common_curves(cards: Sequence[Card]) -> list[list[CardCurve]]:
     """Return the curves that all cards share. Each entry lists the curve of every card."""
-    found = []
-    for first in about[0].measured.curves:
-        same = [
+    common_curves = []
+    for first_curve in cards[0].measured.curves:
+        matching_curves = [
             curve
-            for each in about
+            for each in cards
             for curve in each.measured.curves
-            if (curve.varied, curve.under, curve.values) == (first.varied, first.under, first.values)
+            if (curve.varied, curve.under, curve.values) == (first_curve.varied, first_curve.under, first_curve.values)
         ]
-        if len(same) == len(about):
-            found.append(same)
-    return found
+        if len(matching_curves) == len(cards):
+            common_curves.append(matching_curves)
+    return common_curves
 
 
-def _build_comparison_table(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], chosen: Sequence[str]) -> Table:
-    made = create_table("", *chosen, "of", right=("", *chosen, "of"), title=title)
-    for head, tallies in rows:
+def _build_comparison_table(title: str, rows: Sequence[tuple[str, Sequence[Tally]]], names: Sequence[str]) -> Table:
+    table = create_table("", *names, "of", right=("", *names, "of"), title=title)
+    for heading, tallies in rows:
         shares = (f"{tally.share:.3f} ({format_interval(tally)})" for tally in tallies)
-        made.add_row(head, *shares, "/".join(dict.fromkeys(str(tally.n) for tally in tallies)))
-    return made
+        table.add_row(heading, *shares, "/".join(dict.fromkeys(str(tally.n) for tally in tallies)))
+    return table

@@ -30,11 +30,11 @@ def train(
     from models.training import train as train_model
 
     with user_permissions():
-        about = train_model(name, output)
-    same = name in list_classifier_names() and load_card(name).sha256 == about.sha256
-    print_json(file=output / about.file, training_images=about.training_images, sha256=about.sha256, same=same)
-    print_line(f"{output / about.file}: {about.training_images} images, sha256 {about.sha256[:16]}")
-    print_line("identical to the packaged weights" if same else "differs from the packaged weights")
+        card = train_model(name, output)
+    is_identical = name in list_classifier_names() and load_card(name).sha256 == card.sha256
+    print_json(file=output / card.file, training_images=card.training_images, sha256=card.sha256, same=is_identical)
+    print_line(f"{output / card.file}: {card.training_images} images, sha256 {card.sha256[:16]}")
+    print_line("identical to the packaged weights" if is_identical else "differs from the packaged weights")
 
 
 def evaluate(name: Name, output: Output = None) -> None:
@@ -60,49 +60,51 @@ def evaluate(name: Name, output: Output = None) -> None:
 
 
 def _build_summary_table(result: Evaluation) -> Table:
-    about, accuracy = result.card, result.measured.accuracy
-    made = create_table("", "")
-    right = f"{accuracy.share:.3f} ({accuracy.right} of {accuracy.n}), 95 % interval {format_interval(accuracy)}"
+    card, accuracy = result.card, result.measured.accuracy
+    table = create_table("", "")
+    accuracy_text = (
+        f"{accuracy.share:.3f} ({accuracy.right} of {accuracy.n}), 95 % interval {format_interval(accuracy)}"
+    )
     for key, value in (
-        ("model", f"{about.name}, {about.file}"),
-        ("task", about.task),
-        ("network", about.architecture),
-        ("input", about.preprocessing),
-        ("trained on", f"{about.training_images} images, seed {about.seed}: {about.training_data}"),
-        ("tested on", about.test_data),
-        ("right", right),
+        ("model", f"{card.name}, {card.file}"),
+        ("task", card.task),
+        ("network", card.architecture),
+        ("input", card.preprocessing),
+        ("trained on", f"{card.training_images} images, seed {card.seed}: {card.training_data}"),
+        ("tested on", card.test_data),
+        ("right", accuracy_text),
     ):
-        made.add_row(key, value)
-    return made
+        table.add_row(key, value)
+    return table
 
 
 def _build_confusion_table(classes: tuple[str, ...], confusion: Confusion) -> Table:
-    short = [label if len(label) < 3 else str(number) for number, label in enumerate(classes)]
-    numbers = (*short, "recall", "precision")
-    made = create_table("shown \\ read as", *numbers, right=numbers)
+    short_labels = [label if len(label) < 3 else str(number) for number, label in enumerate(classes)]
+    numbers = (*short_labels, "recall", "precision")
+    table = create_table("shown \\ read as", *numbers, right=numbers)
     for number, (label, row) in enumerate(zip(classes, confusion, strict=True)):
-        read = sum(other[number] for other in confusion)
-        name = label if label == short[number] else f"{number} {label}"
-        made.add_row(
+        answer_count = sum(other[number] for other in confusion)
+        name = label if label == short_labels[number] else f"{number} {label}"
+        table.add_row(
             name, *(str(count) if count else "·" for count in row), _format_share(row[number], sum(row)),
-            _format_share(row[number], read),
+            _format_share(row[number], answer_count),
         )  # fmt: skip
-    return made
+    return table
 
 
 def _build_curve_tables(curves: tuple[CardCurve, ...]) -> list[Table]:
     tables = []
     for curve in curves:
         numbers = (f"{curve.varied} ({curve.unit})", "right", "of", "share", "95 % interval")
-        made = create_table(*numbers, right=numbers, title=f"{curve.varied}: {curve.under}")
+        table = create_table(*numbers, right=numbers, title=f"{curve.varied}: {curve.under}")
         for value, tally in zip(curve.values, curve.tallies, strict=True):
-            made.add_row(f"{value:g}", str(tally.right), str(tally.n), f"{tally.share:.3f}", format_interval(tally))
-        tables.append(made)
+            table.add_row(f"{value:g}", str(tally.right), str(tally.n), f"{tally.share:.3f}", format_interval(tally))
+        tables.append(table)
     return tables
 
 
-def _format_share(part: int, whole: int) -> str:
-    return f"{part / whole:.3f}" if whole else "·"
+def _format_share(count: int, total: int) -> str:
+    return f"{count / total:.3f}" if total else "·"
 
 
 def _write_results(result: Evaluation, folder: Path) -> None:

@@ -27,15 +27,17 @@ def build_pair(criterion: AgentPairCriterion, recording: Recording) -> AgentPair
     """Return the pair that a criterion checks: the robot and the responder, unless it names agents."""
     if not criterion.agents:
         return AgentPair("the robot", "the responder", recording)
-    teller, told = criterion.agents
+    sender, receiver = criterion.agents
     messages: list[Message] = []
-    places: dict[int, int] = {}
-    for index, each in enumerate(recording.agent_messages):
-        if (each.sender, each.receiver) == (teller, told):
-            places[index] = len(messages)
-            messages.append(Message(each.t, "robot", each.text, each.t))
-        elif each.reply_to in places:
-            note = "" if each.is_text else VALUE
-            messages.append(Message(each.t, "responder", each.text, each.t, places[each.reply_to], note))
-    faults = tuple(replace(fault, agent="") for fault in recording.faults if fault.agent == told)
-    return AgentPair(f"the {teller}", f"the {told}", replace(recording, messages=tuple(messages), faults=faults))
+    new_indices: dict[int, int] = {}
+    for index, message in enumerate(recording.agent_messages):
+        if (message.sender, message.receiver) == (sender, receiver):
+            new_indices[index] = len(messages)
+            messages.append(Message(message.t, "robot", message.text, message.t))
+        elif message.reply_to in new_indices:
+            note = "" if message.is_text else VALUE
+            messages.append(
+                Message(message.t, "responder", message.text, message.t, new_indices[message.reply_to], note)
+            )
+    faults = tuple(replace(fault, agent="") for fault in recording.faults if fault.agent == receiver)
+    return AgentPair(f"the {sender}", f"the {receiver}", replace(recording, messages=tuple(messages), faults=faults))

@@ -62,22 +62,22 @@ def as_text(value: Any) -> str:
         return "(nested too deeply)"
 
 
-def is_same_value(found: Any, expected: Any) -> bool:
+def is_same_value(actual: Any, expected: Any) -> bool:
     """Return whether two JSON values are equal. Numbers compare by value, booleans only with booleans."""
-    if isinstance(found, bool) or isinstance(expected, bool):
-        return found is expected
-    if isinstance(found, int | float) and isinstance(expected, int | float):
+    if isinstance(actual, bool) or isinstance(expected, bool):
+        return actual is expected
+    if isinstance(actual, int | float) and isinstance(expected, int | float):
         try:
-            return abs(found - expected) <= 1e-9 * max(1.0, abs(expected))
+            return abs(actual - expected) <= 1e-9 * max(1.0, abs(expected))
         except OverflowError:  # an integer larger than any float
-            return found == expected
-    if isinstance(found, str) and isinstance(expected, str):
-        return found.split() == expected.split()
-    if isinstance(found, list) and isinstance(expected, list | tuple):
-        return len(found) == len(expected) and all(map(is_same_value, found, expected))
-    if isinstance(found, dict) and isinstance(expected, dict):
-        return found.keys() == expected.keys() and all(is_same_value(found[key], expected[key]) for key in expected)
-    return found is None and expected is None
+            return actual == expected
+    if isinstance(actual, str) and isinstance(expected, str):
+        return actual.split() == expected.split()
+    if isinstance(actual, list) and isinstance(expected, list | tuple):
+        return len(actual) == len(expected) and all(map(is_same_value, actual, expected))
+    if isinstance(actual, dict) and isinstance(expected, dict):
+        return actual.keys() == expected.keys() and all(is_same_value(actual[key], expected[key]) for key in expected)
+    return actual is None and expected is None
 
 
 class Answers:
@@ -104,8 +104,8 @@ class Answers:
 
     def find_fault_after(self, index: int) -> Fault | None:
         """Return the responder's first fault since the message at ``index`` was sent, or None."""
-        place = bisect_left(self._faults, self._messages[index].t - 1e-9, key=lambda fault: fault.t)
-        return self._faults[place] if place < len(self._faults) else None
+        fault_index = bisect_left(self._faults, self._messages[index].t - 1e-9, key=lambda fault: fault.t)
+        return self._faults[fault_index] if fault_index < len(self._faults) else None
 
     def describe_silence(self, index: int) -> str:
         """Return a sentence part that the message at ``index`` had no answer, with the reason if it is recorded."""

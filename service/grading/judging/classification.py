@@ -19,22 +19,27 @@ from submissions.criteria.classification import Classification
 def judge_classification(criterion: Classification, case: Case) -> CriterionResult:
     """Return the fraction of images identified correctly over all trials, and the marks for it."""
 
-    def judged(trials: IndexedTrials) -> CriterionResult:
-        found = classify(criterion, case.assignment, trials)
-        share = _compute_share(criterion, found, has_hidden(trials))
-        words = _describe_mark_conditions(criterion) if share < 1 else ""
+    def judge_trials(trials: IndexedTrials) -> CriterionResult:
+        classification = classify(criterion, case.assignment, trials)
+        share = _compute_share(criterion, classification, has_hidden(trials))
+        conditions = _describe_mark_conditions(criterion) if share < 1 else ""
         return build_recognition_result(
-            criterion, found, share, words, compute_curves(found.samples, dict(trials)), dict(trials)
+            criterion,
+            classification,
+            share,
+            conditions,
+            compute_curves(classification.samples, dict(trials)),
+            dict(trials),
         )
 
-    return judge_pooled(case.list_trials(criterion), judged)
+    return judge_pooled(case.list_trials(criterion), judge_trials)
 
 
-def _compute_share(criterion: Classification, found: ClassificationResult, hidden: bool) -> Fraction:
-    right, count = found.correct_count, found.accuracy.n
+def _compute_share(criterion: Classification, classification: ClassificationResult, hidden: bool) -> Fraction:
+    correct_count, count = classification.correct_count, classification.accuracy.n
     if criterion.steps:
-        return compute_steps_share(right, count, criterion.steps, criterion.marks)
-    share = compute_accuracy_share(right, count, criterion.at_least, criterion.over)
+        return compute_steps_share(correct_count, count, criterion.steps, criterion.marks)
+    share = compute_accuracy_share(correct_count, count, criterion.at_least, criterion.over)
     return round_to_steps(share) if hidden else share
 
 

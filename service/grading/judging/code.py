@@ -29,9 +29,9 @@ _MAX_LISTED = 4
 @declare_case_judge(SourceRules)
 def judge_source_rules(criterion: SourceRules, case: Case) -> CriterionResult:
     """Judge what the source must and must not contain, once for all trials."""
-    driven = case.trials if criterion.part == "program" else ()
+    program_trials = case.trials if criterion.part == "program" else ()
     answers = case.analysis.answers.get(criterion.id)
-    return judge_once(criterion, judge_source(criterion, answers, case.analysis.flags, driven))
+    return judge_once(criterion, judge_source(criterion, answers, case.analysis.flags, program_trials))
 
 
 @declare_case_judge(Functions)
@@ -52,41 +52,43 @@ def judge_source(
     criterion: SourceRules, answers: SourceAnswers | None, flags: Flags, trials: Sequence[TrialResult] = ()
 ) -> Outcome:
     """Judge the source. ``trials`` are the runs of the program."""
-    whose = "your program" if criterion.part == "program" else "your responder"
+    part_name = "your program" if criterion.part == "program" else "your responder"
     if answers is None:
-        return fail_with(f"Expected {whose} to be submitted, but it was not.")
+        return fail_with(f"Expected {part_name} to be submitted, but it was not.")
     if answers.error:
-        return fail_with(f"Expected {whose} to be readable as Python, but: {answers.error}.")
-    wrong: list[str] = []
-    for rule, place in zip(criterion.uses, answers.uses, strict=True):
-        if place is None:
-            wrong.append(
-                f"Expected {whose} to use {_describe_rule(rule)}, but it does not, or only in code that is not run"
+        return fail_with(f"Expected {part_name} to be readable as Python, but: {answers.error}.")
+    problems: list[str] = []
+    for rule, position in zip(criterion.uses, answers.uses, strict=True):
+        if position is None:
+            problems.append(
+                f"Expected {part_name} to use {_describe_rule(rule)}, but it does not, or only in code that is not run"
             )
-    for rule, place in zip(criterion.avoids, answers.avoids, strict=True):
-        but = (
-            f"{place} uses it"
-            if place is not None
+    for rule, position in zip(criterion.avoids, answers.avoids, strict=True):
+        finding = (
+            f"{position} uses it"
+            if position is not None
             else _describe_unseen_speech(rule, answers, trials) or answers.unread
         )
-        if but:
-            wrong.append(f"Expected {whose} not to use {_describe_rule(rule)}, but {but}")
-    for rule, place in zip(criterion.in_loop, answers.in_loop, strict=True):
-        if place is None:
-            wrong.append(
-                f"Expected {whose} to call {rule} inside a loop, but it does not, or only in code that is not run"
+        if finding:
+            problems.append(f"Expected {part_name} not to use {_describe_rule(rule)}, but {finding}")
+    for rule, position in zip(criterion.in_loop, answers.in_loop, strict=True):
+        if position is None:
+            problems.append(
+                f"Expected {part_name} to call {rule} inside a loop, but it does not, or only in code that is not run"
             )
-    for rule, place in zip(criterion.defines, answers.defines, strict=True):
-        if place is None:
-            wrong.append(f"Expected {whose} to define a function {rule}, but it does not")
-    asked = _list_missing_flags(criterion, flags)
-    wrong += [f"Expected the magic line of {whose} to have {told}, but it does not" for told in asked if told]
+    for rule, position in zip(criterion.defines, answers.defines, strict=True):
+        if position is None:
+            problems.append(f"Expected {part_name} to define a function {rule}, but it does not")
+    missing_flags = _list_missing_flags(criterion, flags)
+    problems += [
+        f"Expected the magic line of {part_name} to have {told}, but it does not" for told in missing_flags if told
+    ]
     for_staff = _build_staff_note(criterion, answers)
-    if not wrong:
-        return pass_with(f"The code of {whose} is as expected.", for_staff=for_staff)
-    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(asked)
-    message = f"{'. '.join(wrong[:_MAX_LISTED])}."
-    return fail_with(message, score=Fraction(count - len(wrong), count), for_staff=for_staff)
+    if not problems:
+        return pass_with(f"The code of {part_name} is as expected.", for_staff=for_staff)
+    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(missing_flags)
+    message = f"{'. '.join(problems[:_MAX_LISTED])}."
+    return fail_with(message, score=Fraction(count - len(problems), count), for_staff=for_staff)
 
 
 def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
@@ -94,12 +96,12 @@ def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[
 
     A rule may name only one of the speech functions.
     """
-    meant = [fnmatchcase(call, rule) for call in SPEECH]
-    shown = any(place is not None for place in answers.speech)
-    if not rule.endswith("()") or not any(meant) or shown:
+    matches = [fnmatchcase(call, rule) for call in SPEECH]
+    is_shown = any(place is not None for place in answers.speech)
+    if not rule.endswith("()") or not any(matches) or is_shown:
         return ""
-    spoke = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
-    return "the robot spoke during the run" if spoke else ""
+    has_spoken = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
+    return "the robot spoke during the run" if has_spoken else ""
 
 
 def _build_staff_note(criterion: SourceRules, answers: SourceAnswers) -> str:
@@ -113,12 +115,12 @@ def _list_missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
     """Return one entry per required flag: the flag if it is missing, otherwise empty."""
     if not criterion.flags:
         return []
-    wanted = parse_flag_texts(criterion.flags)
+    required_flags = parse_flag_texts(criterion.flags)
     values = [
         "" if flags.values.get(short) == value else f"-{short} {value}"
-        for short, value in sorted(wanted.values.items())
+        for short, value in sorted(required_flags.values.items())
     ]
-    return values + ["" if short in flags.switches else f"-{short}" for short in sorted(wanted.switches)]
+    return values + ["" if short in flags.switches else f"-{short}" for short in sorted(required_flags.switches)]
 
 
 def _describe_rule(rule: str) -> str:
@@ -139,130 +141,143 @@ def list_calls(criterion: Functions) -> tuple[FunctionCall, ...]:
     )
 
 
-def _judge_calls(criterion: Functions, called: CallResults | None) -> Outcome:
-    if called is None:
+def _judge_calls(criterion: Functions, results: CallResults | None) -> Outcome:
+    if results is None:
         return fail_with("Expected a responder to be submitted, but it was not.")
-    if called.fault is not None:
-        return fail_with(f"Expected the responder to be loaded, but: {describe_fault(called.fault)}.")
+    if results.fault is not None:
+        return fail_with(f"Expected the responder to be loaded, but: {describe_fault(results.fault)}.")
     scores: list[Fraction] = []
-    first = for_staff = ""
-    least = Fraction(str(criterion.at_least)) if criterion.each else Fraction(1)
-    for call, gave in zip(criterion.calls, called.returned, strict=True):
-        score, what = _compare_call(criterion, call, gave)
+    first_problem = for_staff = ""
+    min_score = Fraction(str(criterion.at_least)) if criterion.each else Fraction(1)
+    for call, call_result in zip(criterion.calls, results.returned, strict=True):
+        score, description = _compare_call(criterion, call, call_result)
         scores.append(score)
-        if score < least:
-            told = f"Expected {_format_call(criterion, call)} to return {_format_expected(call)}, but {what}"
+        if score < min_score:
+            problem = f"Expected {_format_call(criterion, call)} to return {_format_expected(call)}, but {description}"
             if call.hidden:
-                for_staff = for_staff or f"The first hidden call with a wrong result: {told}."
+                for_staff = for_staff or f"The first hidden call with a wrong result: {problem}."
             else:
-                first = first or told
+                first_problem = first_problem or problem
     return _combine_call_scores(
-        criterion, scores, first or _describe_hidden_failures(criterion, called, scores, least), for_staff
+        criterion, scores, first_problem or _describe_hidden_failures(criterion, results, scores, min_score), for_staff
     )
 
 
-def _combine_call_scores(criterion: Functions, scores: Sequence[Fraction], wrong: str, for_staff: str) -> Outcome:
-    """Return the outcome of the calls. ``wrong`` describes the first problem, if any."""
+def _combine_call_scores(criterion: Functions, scores: Sequence[Fraction], problem: str, for_staff: str) -> Outcome:
+    """Return the outcome of the calls. ``problem`` describes the first problem, if any."""
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
-    if not wrong or (criterion.table and share >= Fraction(str(criterion.at_least))):
-        some = f"{float(share):.0%} correct" if criterion.each else f"{len(scores)} of {len(scores)} calls correct"
-        some = f"at least {criterion.at_least:.0%} of {len(scores)} calls correct" if criterion.table else some
-        return pass_with(f"The functions returned the expected values: {some}.", measures=measures, for_staff=for_staff)
-    right = sum(score == 1 for score in scores)
-    tally = f" ({right} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
+    if not problem or (criterion.table and share >= Fraction(str(criterion.at_least))):
+        summary = f"{float(share):.0%} correct" if criterion.each else f"{len(scores)} of {len(scores)} calls correct"
+        summary = f"at least {criterion.at_least:.0%} of {len(scores)} calls correct" if criterion.table else summary
+        return pass_with(
+            f"The functions returned the expected values: {summary}.", measures=measures, for_staff=for_staff
+        )
+    right_count = sum(score == 1 for score in scores)
+    tally = f" ({right_count} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
     score = round_to_steps(share) if criterion.table else share
-    return fail_with(f"{wrong}{tally}.", score=score, measures=measures, for_staff=for_staff)
+    return fail_with(f"{problem}{tally}.", score=score, measures=measures, for_staff=for_staff)
 
 
 def _describe_hidden_failures(
-    criterion: Functions, called: CallResults, scores: Sequence[Fraction], least: Fraction
+    criterion: Functions, results: CallResults, scores: Sequence[Fraction], min_score: Fraction
 ) -> str:
     """Return the message if only hidden calls failed, without values or errors, which a program can choose."""
     calls = criterion.calls
-    if not any(score < least for score in scores):
+    if not any(score < min_score for score in scores):
         return ""
-    faults = [gave.fault.message if gave.fault is not None else "" for gave in called.returned]
+    faults = [gave.fault.message if gave.fault is not None else "" for gave in results.returned]
     if all(
         fault == describe_missing_function(call.function or criterion.function)
         for call, fault in zip(calls, faults, strict=True)
     ):
         return f"Expected all functions to exist, but {faults[0]}"
-    hidden = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
+    hidden_scores = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
     if criterion.table:
         share = round_to_steps(sum(scores, Fraction(0)) / len(scores))
-        asked = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
-        return f"{asked}, but it was correct in about {float(share):.0%}"
-    right = sum(score >= least for score in hidden)
-    return f"Expected the right values in all {len(hidden)} hidden calls as well, but {right} of them were right"
+        expectation = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
+        return f"{expectation}, but it was correct in about {float(share):.0%}"
+    right_count = sum(score >= min_score for score in hidden_scores)
+    return (
+        f"Expected the right values in all {len(hidden_scores)} hidden calls as well, but {right_count} of them were "
+        "right"
+    )
 
 
-def _judge_check_result(criterion: PythonCheck, gave: CallResult) -> Outcome:
+def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outcome:
     """Return the outcome from an instructor's check.
 
     Raises:
         AssignmentError: The check failed or returned an invalid value.
     """
-    if gave.fault is not None:
-        raise AssignmentError(f"The assignment's own check fails: {criterion.file}: {describe_fault(gave.fault)}.")
-    told = {"passed": gave.value} if isinstance(gave.value, bool) else gave.value
-    returned = f"{criterion.file}: check returned {quote_text(as_text(gave.value))}"
-    wrong = f"The assignment's own check fails: {returned}, expected True, False or a dict"
-    if not isinstance(told, dict) or not isinstance(told.get("passed"), bool):
-        raise AssignmentError(f'{wrong} with "passed".')
-    score, measures = told.get("score", 0), told.get("measures", {})
-    message = told.get("message") or ("As expected." if told["passed"] else "Not as expected.")
+    if call_result.fault is not None:
+        raise AssignmentError(
+            f"The assignment's own check fails: {criterion.file}: {describe_fault(call_result.fault)}."
+        )
+    result = {"passed": call_result.value} if isinstance(call_result.value, bool) else call_result.value
+    description = f"{criterion.file}: check returned {quote_text(as_text(call_result.value))}"
+    problem = f"The assignment's own check fails: {description}, expected True, False or a dict"
+    if not isinstance(result, dict) or not isinstance(result.get("passed"), bool):
+        raise AssignmentError(f'{problem} with "passed".')
+    score, measures = result.get("score", 0), result.get("measures", {})
+    message = result.get("message") or ("As expected." if result["passed"] else "Not as expected.")
     numbers = [score, *measures.values()] if isinstance(measures, dict) else [None]
     if not isinstance(message, str) or not all(map(_is_number, numbers)):
-        raise AssignmentError(f"{wrong}: message is a text, score a number, measures maps names to numbers.")
+        raise AssignmentError(f"{problem}: message is a text, score a number, measures maps names to numbers.")
     message = " ".join(message.split())[:_LONGEST_MESSAGE]
-    kept = tuple(Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES])
-    if told["passed"]:
-        return pass_with(message, measures=kept)
-    return fail_with(message, score=Fraction(str(score)), measures=kept)
+    kept_measures = tuple(
+        Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES]
+    )
+    if result["passed"]:
+        return pass_with(message, measures=kept_measures)
+    return fail_with(message, score=Fraction(str(score)), measures=kept_measures)
 
 
-def _compare_call(criterion: Functions, call: ExpectedCall, gave: CallResult) -> tuple[Fraction, str]:
+def _compare_call(criterion: Functions, call: ExpectedCall, call_result: CallResult) -> tuple[Fraction, str]:
     """Return the correct fraction of a call, and a description of what happened."""
-    if gave.fault is not None:
-        return Fraction(0), f"it did not: {describe_fault(gave.fault)}"
-    value = gave.value
+    if call_result.fault is not None:
+        return Fraction(0), f"it did not: {describe_fault(call_result.fault)}"
+    value = call_result.value
     if criterion.path is not None:
         value = find_at_path(parse_json_answer(value), criterion.path) if isinstance(value, str) else MISSING
         if value is MISSING:
-            return Fraction(0), f"there is nothing at {criterion.path} in {quote_text(as_text(gave.value))}"
-    what = f"it returned {_format_value(value)}"
+            return Fraction(0), f"there is nothing at {criterion.path} in {quote_text(as_text(call_result.value))}"
+    description = f"it returned {_format_value(value)}"
     if criterion.each:
-        return _compute_correct_share(criterion, call.returns, value), what
-    wanted = call.one_of or (call.returns,)
-    return Fraction(any(_is_close_value(criterion, value, each) for each in wanted)), what
+        return _compute_correct_share(criterion, call.returns, value), description
+    allowed_values = call.one_of or (call.returns,)
+    return Fraction(any(_is_close_value(criterion, value, each) for each in allowed_values)), description
 
 
-def _compute_correct_share(criterion: Functions, wanted: Sequence[Any], value: Any) -> Fraction:
+def _compute_correct_share(criterion: Functions, expected_values: Sequence[Any], value: Any) -> Fraction:
     if not isinstance(value, list):
         return Fraction(0)
-    right = sum(_is_close_value(criterion, got, each) for got, each in zip(value, wanted, strict=False))
-    return Fraction(right, max(len(wanted), len(value)))
+    right_count = sum(_is_close_value(criterion, got, each) for got, each in zip(value, expected_values, strict=False))
+    return Fraction(right_count, max(len(expected_values), len(value)))
 
 
-def _is_close_value(criterion: Functions, found: Any, wanted: Any) -> bool:
+def _is_close_value(criterion: Functions, actual: Any, expected: Any) -> bool:
     """Return whether values are equal as JSON, numbers within the tolerance, texts apart from repeated spaces."""
-    if isinstance(found, bool) or isinstance(wanted, bool):
-        return found is wanted
-    if _is_number(found) and _is_number(wanted):
-        return abs(float(found) - float(wanted)) <= criterion.tolerance + 1e-12
-    if isinstance(found, str) and isinstance(wanted, str):
-        one, other = " ".join(found.split()), " ".join(wanted.split())
-        return one.casefold() == other.casefold() if criterion.ignore_case else one == other
-    if isinstance(found, list) and isinstance(wanted, list | tuple):
-        return len(found) == len(wanted) and all(
-            _is_close_value(criterion, got, each) for got, each in zip(found, wanted, strict=True)
+    if isinstance(actual, bool) or isinstance(expected, bool):
+        return actual is expected
+    if _is_number(actual) and _is_number(expected):
+        return abs(float(actual) - float(expected)) <= criterion.tolerance + 1e-12
+    if isinstance(actual, str) and isinstance(expected, str):
+        actual_text, expected_text = " ".join(actual.split()), " ".join(expected.split())
+        return (
+            actual_text.casefold() == expected_text.casefold()
+            if criterion.ignore_case
+            else actual_text == expected_text
         )
-    if isinstance(found, dict) and isinstance(wanted, dict):
-        return found.keys() == wanted.keys() and all(
-            _is_close_value(criterion, found[key], wanted[key]) for key in wanted
+    if isinstance(actual, list) and isinstance(expected, list | tuple):
+        return len(actual) == len(expected) and all(
+            _is_close_value(criterion, got, each) for got, each in zip(actual, expected, strict=True)
         )
-    return found is None and wanted is None
+    if isinstance(actual, dict) and isinstance(expected, dict):
+        return actual.keys() == expected.keys() and all(
+            _is_close_value(criterion, actual[key], expected[key]) for key in expected
+        )
+    return actual is None and expected is None
 
 
 def _is_number(value: Any) -> bool:
@@ -287,5 +302,5 @@ def _format_expected(call: ExpectedCall) -> str:
 
 def _format_value(value: Any) -> str:
     """Return the value for a message: texts in quotes, others as they are, shortened."""
-    told = quote_text(as_text(value))
-    return told if isinstance(value, str) else told[1:-1]
+    text = quote_text(as_text(value))
+    return text if isinstance(value, str) else text[1:-1]

@@ -46,46 +46,53 @@ class ImagePair:
 def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     """Judge the labelled image pairs: count them by class, without repetitions, and compare with the requirement."""
     recording = trial.recording
-    found = collect_pairs(recording, criterion.source, trial.light_noise)
+    pairs = collect_pairs(recording, criterion.source, trial.light_noise)
     classes = criterion.classes or list_label_names(recording.background)
-    usable = [pair for pair in found if pair.label in classes]
+    usable = [pair for pair in pairs if pair.label in classes]
     counts = Counter(pair.label for pair in _drop_repeated_pairs(usable, recording))
-    repeated = len(found) - len(_drop_repeated_pairs(found, recording))
+    repeated_count = len(pairs) - len(_drop_repeated_pairs(pairs, recording))
     measures = (
-        Measure("pairs", float(len(found))),
+        Measure("pairs", float(len(pairs))),
         Measure("usable", float(len(usable))),
-        Measure("duplicates", float(repeated)),
+        Measure("duplicates", float(repeated_count)),
         *(Measure(f"different: {label}", float(counts[label])) for label in classes),
     )
-    where = found[-1].image if found else None
-    wanted = criterion.each * len(classes)
-    reached = Fraction(sum(min(counts[label], criterion.each) for label in classes), wanted) if wanted else Fraction(0)
-    checks = list(_build_checks(criterion, classes, counts, found, len(usable), repeated))
-    wrong = next((words for holds, words in checks if not holds), None)
-    if wrong is None:
-        counted = ", ".join(f"{counts[label]} of {quote_text(label)}" for label in classes)
+    last_image = pairs[-1].image if pairs else None
+    required_count = criterion.each * len(classes)
+    score = (
+        Fraction(sum(min(counts[label], criterion.each) for label in classes), required_count)
+        if required_count
+        else Fraction(0)
+    )
+    checks = list(_build_checks(criterion, classes, counts, pairs, len(usable), repeated_count))
+    problem = next((words for holds, words in checks if not holds), None)
+    if problem is None:
+        counts_text = ", ".join(f"{counts[label]} of {quote_text(label)}" for label in classes)
         return pass_with(
-            f"Of {len(found)} pairs of images {len(usable)} are usable, {repeated} repeat an earlier one: {counted}.",
-            where.t if where else None,
-            where.pose if where else None,
+            f"Of {len(pairs)} pairs of images {len(usable)} are usable, {repeated_count} repeat an earlier one: "
+            f"{counts_text}.",
+            last_image.t if last_image else None,
+            last_image.pose if last_image else None,
             measures,
         )
-    if reached == 1:
-        reached = 1 - _REMAINDER_SHARE * Fraction(sum(not holds for holds, _ in checks), len(checks))
-    return fail_with(f"{wrong}.", where.t if where else None, where.pose if where else None, reached, measures)
+    if score == 1:
+        score = 1 - _REMAINDER_SHARE * Fraction(sum(not holds for holds, _ in checks), len(checks))
+    return fail_with(
+        f"{problem}.", last_image.t if last_image else None, last_image.pose if last_image else None, score, measures
+    )
 
 
-def _drop_repeated_pairs(found: Sequence[ImagePair], recording: Recording) -> list[ImagePair]:
+def _drop_repeated_pairs(pairs: Sequence[ImagePair], recording: Recording) -> list[ImagePair]:
     """Return the pairs whose left image shows a new window of the floor and differs from all earlier ones."""
-    known: set[object] = set()
-    fresh = []
-    for pair in found:
-        where = locate_footprint(recording, "left", pair.image.pose)
-        own: set[object] = {pair.image.left, (where.column, where.row)}
-        if own.isdisjoint(known):
-            fresh.append(pair)
-        known |= own
-    return fresh
+    known_keys: set[object] = set()
+    distinct_pairs = []
+    for pair in pairs:
+        footprint = locate_footprint(recording, "left", pair.image.pose)
+        keys: set[object] = {pair.image.left, (footprint.column, footprint.row)}
+        if keys.isdisjoint(known_keys):
+            distinct_pairs.append(pair)
+        known_keys |= keys
+    return distinct_pairs
 
 
 def collect_pairs(recording: Recording, source: str, light_noise: float = 0.0) -> list[ImagePair]:
@@ -101,13 +108,13 @@ def collect_pairs(recording: Recording, source: str, light_noise: float = 0.0) -
 def _pair_logged_images(recording: Recording) -> Iterator[Image]:
     """Yield each logged left image, with the right one if it follows, like ``get_sensor_image_pair``."""
     log = recording.image_log
-    for (side, left, tick), (other, right, _) in pairwise((*log, ("", "", 0))):
+    for (side, left_csv, tick), (next_side, right_csv, _) in pairwise((*log, ("", "", 0))):
         if side == "left":
             t = tick_to_seconds(recording, tick)
-            pixels = _parse_bytes(left)
-            beside = _parse_bytes(right) if other == "right" else b""
+            pixels = _parse_bytes(left_csv)
+            right_pixels = _parse_bytes(right_csv) if next_side == "right" else b""
             yield Image(
-                t, tick, get_pose_after(recording, tick), pixels, beside, -1, side=round((len(pixels) / 4) ** 0.5)
+                t, tick, get_pose_after(recording, tick), pixels, right_pixels, -1, side=round((len(pixels) / 4) ** 0.5)
             )
 
 
@@ -127,20 +134,20 @@ def _build_checks(
     criterion: Collects,
     classes: Sequence[str],
     counts: Counter[str | None],
-    found: Sequence[ImagePair],
+    pairs: Sequence[ImagePair],
     usable: int,
-    repeated: int,
+    repeated_count: int,
 ) -> Iterator[tuple[bool, str]]:
     """Yield each condition with the message for the case that it fails."""
-    how = "image_data both" if criterion.source == "log" else "IMG_DATA"
-    yield bool(found), f"Expected pairs of images to be collected, but there are none ({how})"
+    command = "image_data both" if criterion.source == "log" else "IMG_DATA"
+    yield bool(pairs), f"Expected pairs of images to be collected, but there are none ({command})"
     rarest = min(classes, key=lambda label: counts[label], default="")
     commonest = max(classes, key=lambda label: counts[label], default="")
     images = "image" if criterion.each == 1 else "images"
     yield (
         bool(classes) and counts[rarest] >= criterion.each,
         f"Expected at least {criterion.each} different usable {images} of each class, but there are "
-        f"{counts[rarest]} of {quote_text(rarest)}; {usable} of {len(found)} pairs are usable, with a pattern "
+        f"{counts[rarest]} of {quote_text(rarest)}; {usable} of {len(pairs)} pairs are usable, with a pattern "
         "under the "
         "left sensor and its label patch under the right one",
     )
@@ -151,12 +158,13 @@ def _build_checks(
             f"there are {counts[rarest]} of {quote_text(rarest)} and {counts[commonest]} of {quote_text(commonest)}",
         )
     yield (
-        repeated <= criterion.most_duplicates * len(found),
-        f"Expected at most {criterion.most_duplicates:.0%} of the images to repeat an earlier one, but {repeated} of "
-        f"{len(found)} do",
+        repeated_count <= criterion.most_duplicates * len(pairs),
+        f"Expected at most {criterion.most_duplicates:.0%} of the images to repeat an earlier one, but "
+        f"{repeated_count} of "
+        f"{len(pairs)} do",
     )
-    useless = len(found) - usable
+    useless = len(pairs) - usable
     yield (
-        useless <= criterion.most_unusable * len(found),
-        f"Expected at most {criterion.most_unusable:.0%} of pairs to be unusable, but {useless} of {len(found)} are",
+        useless <= criterion.most_unusable * len(pairs),
+        f"Expected at most {criterion.most_unusable:.0%} of pairs to be unusable, but {useless} of {len(pairs)} are",
     )

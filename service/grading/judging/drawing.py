@@ -57,20 +57,20 @@ class Leg:
 def find_legs(recording: Recording, pen: bool) -> tuple[Leg, ...]:
     """Return the legs of a path in order. With ``pen``, only drawn ones."""
     points = compute_positions(recording)
-    ahead, _ = compute_travel(recording)
-    going = compute_straight_mask(recording)
-    drawn = compute_pen_mask(recording) if pen else np.ones(len(points), dtype=bool)
-    going &= drawn[:-1] & drawn[1:]
+    forward_steps, _ = compute_travel(recording)
+    is_straight = compute_straight_mask(recording)
+    is_drawn = compute_pen_mask(recording) if pen else np.ones(len(points), dtype=bool)
+    is_straight &= is_drawn[:-1] & is_drawn[1:]
     parts = [
         _build_leg(points, first, last)
         for way in (1, -1)
-        for first, last in find_true_runs(going & (np.sign(ahead) == way))
+        for first, last in find_true_runs(is_straight & (np.sign(forward_steps) == way))
     ]
     legs: list[Leg] = []
     for part in sorted(parts, key=lambda leg: leg.first):
         if part.length < _MIN_LEG_MM:
             continue
-        if legs and _is_continuation(legs[-1], part) and drawn[legs[-1].last : part.first + 1].all():
+        if legs and _is_continuation(legs[-1], part) and is_drawn[legs[-1].last : part.first + 1].all():
             legs[-1] = _build_leg(points, legs[-1].first, part.last)
         else:
             legs.append(part)
@@ -79,16 +79,16 @@ def find_legs(recording: Recording, pen: bool) -> tuple[Leg, ...]:
 
 def _is_continuation(leg: Leg, part: Leg) -> bool:
     """Return whether a part continues the leg: same direction, and on its line ahead of its end."""
-    along = math.radians(leg.direction)
+    heading = math.radians(leg.direction)
     x, y = part.start[0] - leg.end[0], part.start[1] - leg.end[1]
-    ahead, aside = x * math.cos(along) + y * math.sin(along), y * math.cos(along) - x * math.sin(along)
-    same_direction = abs(compute_turn_angle(leg.direction, part.direction)) < _SAME_DIRECTION_DEGREES
-    return same_direction and ahead > -_MIN_LEG_MM and abs(aside) < _MIN_LEG_MM
+    forward, sideways = x * math.cos(heading) + y * math.sin(heading), y * math.cos(heading) - x * math.sin(heading)
+    is_same_direction = abs(compute_turn_angle(leg.direction, part.direction)) < _SAME_DIRECTION_DEGREES
+    return is_same_direction and forward > -_MIN_LEG_MM and abs(sideways) < _MIN_LEG_MM
 
 
-def compute_turn_angle(before: float, after: float) -> float:
+def compute_turn_angle(first_direction: float, second_direction: float) -> float:
     """Return the angle from one direction to another, degrees to the left, -180 to 180."""
-    return (after - before + 180) % 360 - 180
+    return (second_direction - first_direction + 180) % 360 - 180
 
 
 @declare_judge(Drawing)
@@ -102,26 +102,28 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
             recording.start,
         )
     legs = find_legs(recording, criterion.pen)
-    wanted = sum(criterion.legs_of_each)
+    leg_count = sum(criterion.legs_of_each)
     measures = _build_measures(legs)
-    figures, left_over = _group_figures(criterion, legs)
-    enough = len(figures) >= criterion.figure_count and not left_over if criterion.at_least else len(legs) == wanted
+    figures, remaining_count = _group_figures(criterion, legs)
+    is_complete = (
+        len(figures) >= criterion.figure_count and not remaining_count if criterion.at_least else len(legs) == leg_count
+    )
     problems = [_find_problem(criterion, number, figure) for number, figure in enumerate(figures)]
-    right = sum(problem is None for problem in problems[: criterion.figure_count])
-    score = Fraction(right, criterion.figure_count)
-    if not enough:
+    right_count = sum(problem is None for problem in problems[: criterion.figure_count])
+    score = Fraction(right_count, criterion.figure_count)
+    if not is_complete:
         lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
-        told = f"{len(legs)}, of {lengths} mm" if legs else "none"
-        row = legs[min(wanted, len(legs)) - 1].last if legs else 0
+        lengths_text = f"{len(legs)}, of {lengths} mm" if legs else "none"
+        row = legs[min(leg_count, len(legs)) - 1].last if legs else 0
         return fail_with(
-            f"Expected {_describe_figures(criterion)}, but the path has {told}.",
+            f"Expected {_describe_figures(criterion)}, but the path has {lengths_text}.",
             *find_place(recording, row),
             score=score / 2,
             measures=measures,
         )
-    found = next((problem for problem in problems if problem is not None), None)
-    if found is not None:
-        return fail_with(found.words, *find_place(recording, found.row), score=score, measures=measures)
+    problem = next((problem for problem in problems if problem is not None), None)
+    if problem is not None:
+        return fail_with(problem.words, *find_place(recording, problem.row), score=score, measures=measures)
     means = [_compute_mean_length(figure) for figure in figures]
     if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
         number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
@@ -131,9 +133,9 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
             *find_place(recording, figures[number + 1][-1].last),
             measures=measures,
         )
-    told = ", ".join(f"{mean:.0f}" for mean in means)
+    lengths_text = ", ".join(f"{mean:.0f}" for mean in means)
     return pass_with(
-        f"The path has {len(legs)} straight legs as expected, of {told} mm.",
+        f"The path has {len(legs)} straight legs as expected, of {lengths_text} mm.",
         *find_place(recording, legs[-1].last),
         measures,
     )
@@ -143,13 +145,13 @@ def _group_figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequen
     """Return the complete figures in order, and the number of remaining legs."""
     counts: Iterable[int] = criterion.legs if isinstance(criterion.legs, tuple) else itertools.repeat(criterion.legs)
     figures: list[Sequence[Leg]] = []
-    first = 0
+    start = 0
     for count in counts:
-        if first + count > len(legs):
+        if start + count > len(legs):
             break
-        figures.append(legs[first : first + count])
-        first += count
-    return figures, len(legs) - first
+        figures.append(legs[start : start + count])
+        start += count
+    return figures, len(legs) - start
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,45 +166,45 @@ def _describe_figures(criterion: Drawing) -> str:
     if isinstance(criterion.legs, tuple):
         return f"figures of {quote_list(tuple(map(str, criterion.legs)))} straight legs ({sum(criterion.legs)} in all)"
     legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
-    least = "at least " if criterion.at_least else ""
+    prefix = "at least " if criterion.at_least else ""
     if criterion.figure_count == 1:
-        return f"{least}one figure of {legs}" if least else legs
-    return f"{least}{criterion.figure_count} figures of {legs} ({criterion.figure_count * criterion.legs} in all)"
+        return f"{prefix}one figure of {legs}" if prefix else legs
+    return f"{prefix}{criterion.figure_count} figures of {legs} ({criterion.figure_count * criterion.legs} in all)"
 
 
 def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
     """Return the first problem with the figure, or None."""
     mean = _compute_mean_length(figure)
-    which = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
-    for place, leg in enumerate(figure, 1):
+    figure_clause = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
+    for leg_number, leg in enumerate(figure, 1):
         if leg.length < criterion.shortest:
             return _Problem(
-                f"Expected each leg to be {criterion.shortest:g} mm or longer, but leg {place}{which} has "
+                f"Expected each leg to be {criterion.shortest:g} mm or longer, but leg {leg_number}{figure_clause} has "
                 f"{leg.length:.0f} mm.",
                 leg.last,
             )
         if abs(leg.length - mean) > criterion.equal_within * mean:
             return _Problem(
                 f"Expected equal legs (within {criterion.equal_within:.0%} of their mean, {mean:.0f} mm), "
-                f"but leg {place}{which} has {leg.length:.0f} mm.",
+                f"but leg {leg_number}{figure_clause} has {leg.length:.0f} mm.",
                 leg.last,
             )
-    for place, (before, after) in enumerate(itertools.pairwise(figure), 1):
-        angle = abs(compute_turn_angle(before.direction, after.direction))
-        asked = criterion.angle_of_each[min(number, len(criterion.angle_of_each) - 1)]
-        if abs(angle - asked) > criterion.angle_within:
+    for leg_number, (previous, following) in enumerate(itertools.pairwise(figure), 1):
+        angle = abs(compute_turn_angle(previous.direction, following.direction))
+        required_angle = criterion.angle_of_each[min(number, len(criterion.angle_of_each) - 1)]
+        if abs(angle - required_angle) > criterion.angle_within:
             return _Problem(
-                f"Expected a turn of {asked:g}° (within {criterion.angle_within:g}°) after each leg, "
-                f"but after leg {place}{which} the robot turned {angle:.1f}°.",
-                after.first,
+                f"Expected a turn of {required_angle:g}° (within {criterion.angle_within:g}°) after each leg, "
+                f"but after leg {leg_number}{figure_clause} the robot turned {angle:.1f}°.",
+                following.first,
             )
     if criterion.closes:
         gap = math.dist(figure[0].start, figure[-1].end)
-        allowed = max(criterion.closes_within, mean / 10)
-        if gap > allowed:
+        max_gap = max(criterion.closes_within, mean / 10)
+        if gap > max_gap:
             return _Problem(
-                f"Expected the figure to end within {allowed:.0f} mm of where it began, "
-                f"but the end{which} is {gap:.0f} mm away.",
+                f"Expected the figure to end within {max_gap:.0f} mm of where it began, "
+                f"but the end{figure_clause} is {gap:.0f} mm away.",
                 figure[-1].last,
             )
     if number < len(criterion.sizes):

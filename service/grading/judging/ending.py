@@ -51,7 +51,7 @@ def _describe_end(fault: Fault) -> str:
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     """Judge the end pose. Distances are in mm, angles in degrees modulo 360; the edges belong to a zone."""
     end, t = trial.recording.end, trial.recording.end_t
-    where = f"({end.x:.1f}, {end.y:.1f}) facing {end.heading % 360:.1f}°"
+    pose_text = f"({end.x:.1f}, {end.y:.1f}) facing {end.heading % 360:.1f}°"
     measures = (
         Measure("end x", end.x, "mm"),
         Measure("end y", end.y, "mm"),
@@ -64,7 +64,7 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         if not distance <= criterion.tolerance:
             return fail_with(
                 f"Expected the robot to end within {criterion.tolerance:g} mm of ({criterion.x:g}, {criterion.y:g}), "
-                f"but it ended at {where}, {distance:.1f} mm away.",
+                f"but it ended at {pose_text}, {distance:.1f} mm away.",
                 t,
                 end,
                 measures=measures,
@@ -74,7 +74,7 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         if not (left <= end.x <= right and bottom <= end.y <= top):
             return fail_with(
                 f"Expected the robot to end with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}, "
-                f"but it ended at {where}.",
+                f"but it ended at {pose_text}.",
                 t,
                 end,
                 measures=measures,
@@ -82,64 +82,66 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     if criterion.areas:
         gaps = [float(measure_area_distance(area, np.array([[end.x, end.y]]))[0]) for area in criterion.areas]
         if not min(gaps) <= 0:
-            near = criterion.areas[gaps.index(min(gaps))]
-            one = "in" if len(gaps) == 1 else f"in one of {len(gaps)} areas, the nearest being"
+            nearest_area = criterion.areas[gaps.index(min(gaps))]
+            area_clause = "in" if len(gaps) == 1 else f"in one of {len(gaps)} areas, the nearest being"
             return fail_with(
-                f"Expected the robot to end {one} {near}, but it ended at {where}, {min(gaps):.0f} mm outside.",
+                f"Expected the robot to end {area_clause} {nearest_area}, but it ended at {pose_text}, "
+                f"{min(gaps):.0f} mm outside.",
                 t,
                 end,
                 measures=measures,
             )
     if criterion.heading is not None:
-        off = abs((end.heading - criterion.heading + 180) % 360 - 180)
-        if not off <= criterion.heading_tolerance:
+        heading_error = abs((end.heading - criterion.heading + 180) % 360 - 180)
+        if not heading_error <= criterion.heading_tolerance:
             return fail_with(
                 f"Expected the robot to end facing {criterion.heading:g}° within {criterion.heading_tolerance:g}°, "
-                f"but it ended at {where}, {off:.1f}° off.",
+                f"but it ended at {pose_text}, {heading_error:.1f}° off.",
                 t,
                 end,
                 measures=measures,
             )
     if criterion.since is not None and (problem := _check_since(criterion.since, trial.recording)):
         return fail_with(problem, t, end, measures=measures)
-    return pass_with(f"The robot ended at {where}.", t, end, measures)
+    return pass_with(f"The robot ended at {pose_text}.", t, end, measures)
 
 
-def _check_since(since: SinceEvent, recording: Recording) -> str:
+def _check_since(event: SinceEvent, recording: Recording) -> str:
     """Return the problem with the distance or time since the event; empty if there is none."""
-    came = next((t for t, text in _collect_texts(since, recording) if since.contains in text), None)
-    what = f"{quote_text(since.contains)} was {since.of}"
-    if came is None:
-        return f"Expected that {what}, but it never was."
-    then, end = get_pose_at(recording, came), recording.end
-    moved = math.hypot(end.x - then.x, end.y - then.y)
-    if since.moved is not None and not since.moved[0] <= moved <= since.moved[1]:
+    event_time = next((t for t, text in _collect_texts(event, recording) if event.contains in text), None)
+    event_text = f"{quote_text(event.contains)} was {event.of}"
+    if event_time is None:
+        return f"Expected that {event_text}, but it never was."
+    event_pose, end = get_pose_at(recording, event_time), recording.end
+    distance = math.hypot(end.x - event_pose.x, end.y - event_pose.y)
+    if event.moved is not None and not event.moved[0] <= distance <= event.moved[1]:
         return (
-            f"Expected the robot to end {since.moved[0]:g} to {since.moved[1]:g} mm from where it was when {what}, "
-            f"but it ended {moved:.1f} mm away."
+            f"Expected the robot to end {event.moved[0]:g} to {event.moved[1]:g} mm from where it was when "
+            f"{event_text}, "
+            f"but it ended {distance:.1f} mm away."
         )
-    seconds = recording.end_t - came
-    if since.seconds is not None and not since.seconds[0] - 1e-9 <= seconds <= since.seconds[1] + 1e-9:
+    seconds = recording.end_t - event_time
+    if event.seconds is not None and not event.seconds[0] - 1e-9 <= seconds <= event.seconds[1] + 1e-9:
         return (
-            f"Expected the program to end {since.seconds[0]:g} to {since.seconds[1]:g} s after {what}, "
+            f"Expected the program to end {event.seconds[0]:g} to {event.seconds[1]:g} s after {event_text}, "
             f"but it ended {seconds:.2f} s after."
         )
     return ""
 
 
-def _collect_texts(since: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
+def _collect_texts(event: SinceEvent, recording: Recording) -> list[tuple[float, str]]:
     """Return the times and texts of this kind, in order of time."""
-    match since.of:
+    match event.of:
         case "sent":
-            found = [(each.t, each.text) for each in recording.messages if each.sender == "robot"]
+            texts = [(each.t, each.text) for each in recording.messages if each.sender == "robot"]
         case "answered":
             answers = [each for each in recording.messages if each.sender == "responder"]
-            found = [(each.delivered, each.received) for each in answers if each.delivered is not None]
+            texts = [(each.delivered, each.received) for each in answers if each.delivered is not None]
         case "said":
-            found = [(each.t, each.text) for each in recording.spoken]
+            texts = [(each.t, each.text) for each in recording.spoken]
         case "printed":
-            found = [(each.t, each.text) for each in recording.printed]
-    return sorted(found)
+            texts = [(each.t, each.text) for each in recording.printed]
+    return sorted(texts)
 
 
 def _measure_displacement(recording: Recording) -> tuple[Measure, ...]:

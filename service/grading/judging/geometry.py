@@ -43,27 +43,27 @@ def compute_positions(recording: Recording, part: Part = "robot") -> Floats:
     Invalid positions are NaN too, so every comparison with them is false.
     """
     ticks = recording.ticks
-    middle = np.column_stack(
+    centres = np.column_stack(
         [np.concatenate([[recording.start.x], ticks.x]), np.concatenate([[recording.start.y], ticks.y])]
     )
     if part == "robot":
-        return middle
+        return centres
     if part == "pen":
-        return np.where(compute_pen_mask(recording)[:, None], middle, np.nan)
+        return np.where(compute_pen_mask(recording)[:, None], centres, np.nan)
     light = find_light_sensor(recording, "left" if part == "left_light" else "right")
     # Local x is to the robot's right and y forward, so the rotation is the heading minus a right angle.
-    turned = np.radians(compute_headings(recording) - 90)
-    cosine, sine = np.cos(turned), np.sin(turned)
-    return middle + np.column_stack([cosine * light.x - sine * light.y, sine * light.x + cosine * light.y])
+    rotation = np.radians(compute_headings(recording) - 90)
+    cosine, sine = np.cos(rotation), np.sin(rotation)
+    return centres + np.column_stack([cosine * light.x - sine * light.y, sine * light.x + cosine * light.y])
 
 
 def compute_pen_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether the pen drew on the way to each row, shape (n + 1,), including the first row of each stroke."""
-    down = np.zeros(len(recording.ticks) + 1, dtype=bool)
-    ends = [tick + 1 for tick, _ in recording.pen[1:]] + [len(down)]
+    is_down_mask = np.zeros(len(recording.ticks) + 1, dtype=bool)
+    ends = [tick + 1 for tick, _ in recording.pen[1:]] + [len(is_down_mask)]
     for (tick, is_down), end in zip(recording.pen, ends, strict=False):
-        down[tick:end] |= is_down
-    return down
+        is_down_mask[tick:end] |= is_down
+    return is_down_mask
 
 
 def find_place(recording: Recording, row: int) -> tuple[float, Pose]:
@@ -76,15 +76,15 @@ def find_place(recording: Recording, row: int) -> tuple[float, Pose]:
 def compute_travel(recording: Recording) -> tuple[Floats, Floats]:
     """Return the motion in each tick: mm along the heading (negative backwards), and degrees. Shapes (n,)."""
     points, degrees = compute_positions(recording), compute_headings(recording)
-    along = np.radians(degrees[:-1])
+    radians = np.radians(degrees[:-1])
     steps = np.diff(points, axis=0)
-    return steps[:, 0] * np.cos(along) + steps[:, 1] * np.sin(along), np.diff(degrees)
+    return steps[:, 0] * np.cos(radians) + steps[:, 1] * np.sin(radians), np.diff(degrees)
 
 
 def compute_still_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether the robot stood still in each tick, shape (n,)."""
-    ahead, turned = compute_travel(recording)
-    return (np.abs(ahead) < STILL) & (np.abs(turned) < STILL)
+    forward_steps, turns = compute_travel(recording)
+    return (np.abs(forward_steps) < STILL) & (np.abs(turns) < STILL)
 
 
 def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -95,9 +95,9 @@ def find_true_runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def to_relative_position(start: Pose, x: float, y: float) -> tuple[float, float]:
     """Return a point's distance ahead and to the left of a pose, mm."""
-    along = math.radians(start.heading)
+    heading = math.radians(start.heading)
     dx, dy = x - start.x, y - start.y
-    return dx * math.cos(along) + dy * math.sin(along), -dx * math.sin(along) + dy * math.cos(along)
+    return dx * math.cos(heading) + dy * math.sin(heading), -dx * math.sin(heading) + dy * math.cos(heading)
 
 
 def find_light_sensor(recording: Recording, side: Side) -> LightSensor:
@@ -134,16 +134,16 @@ def locate_footprint(recording: Recording, side: Side, pose: Pose) -> Footprint:
 
 def measure_floor_share(recording: Recording, side: Side, pose: Pose) -> float:
     """Return the fraction of a light sensor's view that is floor, 0 to 1. Everything else is black."""
-    where, diameter = locate_footprint(recording, side, pose), find_light_sensor(recording, side).diameter
-    rows, columns = where.row + np.arange(diameter), where.column + np.arange(diameter)
-    floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
+    footprint, diameter = locate_footprint(recording, side, pose), find_light_sensor(recording, side).diameter
+    rows, columns = footprint.row + np.arange(diameter), footprint.column + np.arange(diameter)
+    is_floor = ((rows >= 0) & (rows < HEIGHT))[:, None] & ((columns >= 0) & (columns < WIDTH))
     mask = build_sensor_mask(diameter)
-    return float((floor & mask).sum() / mask.sum())
+    return float((is_floor & mask).sum() / mask.sum())
 
 
-def is_in_zone(place: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
+def is_in_zone(point: tuple[float, float], zone: Zone, margin: float = 0.0) -> bool:
     """Return whether a place is in [left, bottom, right, top], extended by ``margin`` mm."""
-    (x, y), (left, bottom, right, top) = place, zone
+    (x, y), (left, bottom, right, top) = point, zone
     return left - margin <= x <= right + margin and bottom - margin <= y <= top + margin
 
 
@@ -171,23 +171,23 @@ def _measure_shape_distance(area: Area, points: Floats) -> Floats:
         left, bottom, right, top = area.rectangle
         corners = ((left, bottom), (right, bottom), (right, top), (left, top))
     edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
-    nearest = np.min([measure_segment_distance(points, first, last) for first, last in edges], axis=0)
-    within = np.zeros(len(points), dtype=bool)
+    distances = np.min([measure_segment_distance(points, first, last) for first, last in edges], axis=0)
+    is_inside = np.zeros(len(points), dtype=bool)
     for (x1, y1), (x2, y2) in edges:  # from inside, a ray to the right crosses the outline an odd number of times
-        crosses = (y1 > y) != (y2 > y)
+        is_crossing = (y1 > y) != (y2 > y)
         if y1 != y2:
-            within ^= crosses & (x < x1 + (y - y1) / (y2 - y1) * (x2 - x1))
-    signed: Floats = np.where(within, -nearest, nearest)
-    return signed
+            is_inside ^= is_crossing & (x < x1 + (y - y1) / (y2 - y1) * (x2 - x1))
+    signed_distances: Floats = np.where(is_inside, -distances, distances)
+    return signed_distances
 
 
 def measure_segment_distance(points: Floats, first: tuple[float, float], last: tuple[float, float]) -> Floats:
     """Return the distance of each point (n, 2) to a line segment, mm."""
-    start, along = np.array(first), np.array(last) - np.array(first)
-    length = float(along @ along)
-    share = np.clip((points - start) @ along / length, 0, 1) if length > 0 else np.zeros(len(points))
-    away = points - start - share[:, None] * along
-    distances: Floats = np.hypot(away[:, 0], away[:, 1])
+    start, direction = np.array(first), np.array(last) - np.array(first)
+    length = float(direction @ direction)
+    share = np.clip((points - start) @ direction / length, 0, 1) if length > 0 else np.zeros(len(points))
+    offsets = points - start - share[:, None] * direction
+    distances: Floats = np.hypot(offsets[:, 0], offsets[:, 1])
     return distances
 
 
@@ -209,39 +209,41 @@ class LineProgress:
     length: float
 
 
-def track_line_progress(course: LineToFollow, points: Floats, within: float) -> LineProgress | None:
-    """Return the path's progress from where it first comes ``within`` mm of the line; None if it never does.
+def track_line_progress(course: LineToFollow, points: Floats, max_distance: float) -> LineProgress | None:
+    """Return the path's progress from where it first comes ``max_distance`` mm of the line; None if it never does.
 
     After that, the nearest point is searched only near the previous one. So a path that leaves the line and meets it
     elsewhere, or crosses it, makes no progress. Cutting a corner at d mm from the line on both sides moves the nearest
-    point by 2 d, so a range of twice ``within`` is enough.
+    point by 2 d, so a range of twice ``max_distance`` is enough.
     """
     line = _Line(course)
     distances = line.measure_distances(points)
-    near = np.flatnonzero(distances <= within)
-    if not len(near):
+    near_rows = np.flatnonzero(distances <= max_distance)
+    if not len(near_rows):
         return None
-    first = int(near[0])
-    progress, offset = np.empty(len(points) - first), np.empty(len(points) - first)
-    at, window = line.find_nearest(points[first]), max(_WINDOW, 2.2 * within)
-    for row, (x, y) in enumerate(points[first:]):
-        at, offset[row] = line.step(x, y, at, window)
-        progress[row] = at
-    return LineProgress(first, progress, offset, line.length)
+    first_row = int(near_rows[0])
+    progress, offset = np.empty(len(points) - first_row), np.empty(len(points) - first_row)
+    position, window = line.find_nearest(points[first_row]), max(_WINDOW, 2.2 * max_distance)
+    for row, (x, y) in enumerate(points[first_row:]):
+        position, offset[row] = line.step(x, y, position, window)
+        progress[row] = position
+    return LineProgress(first_row, progress, offset, line.length)
 
 
-def measure_covered_share(found: LineProgress, within: float, begin: float, end: float) -> float:
-    """Return the fraction of the line from ``begin`` to ``end`` that was driven forwards, ``within`` mm of it."""
-    near = np.abs(found.offset) <= within
+def measure_covered_share(line_progress: LineProgress, max_distance: float, start: float, end: float) -> float:
+    """Return the fraction of the line from ``start`` to ``end`` that was driven forwards, ``max_distance`` mm of it."""
+    near_mask = np.abs(line_progress.offset) <= max_distance
     pieces = []
-    for before, after, is_near in zip(found.progress, found.progress[1:], near[:-1] & near[1:], strict=False):
-        if is_near and after > before:
-            pieces.append((max(float(before), begin), min(float(after), end)))
-    reached, total = begin, 0.0
+    for previous, following, is_near in zip(
+        line_progress.progress, line_progress.progress[1:], near_mask[:-1] & near_mask[1:], strict=False
+    ):
+        if is_near and following > previous:
+            pieces.append((max(float(previous), start), min(float(following), end)))
+    covered_until, total = start, 0.0
     for low, high in sorted(pieces):
-        total += max(high - max(low, reached), 0.0)
-        reached = max(reached, high)
-    return total / (end - begin) if end > begin else 0.0
+        total += max(high - max(low, covered_until), 0.0)
+        covered_until = max(covered_until, high)
+    return total / (end - start) if end > start else 0.0
 
 
 class _Line:
@@ -251,9 +253,9 @@ class _Line:
         corners = np.array(course.corners())
         steps = np.diff(corners, axis=0)
         lengths = np.hypot(*steps.T)
-        kept = lengths > 0
-        self._starts, self._lengths = corners[:-1][kept], lengths[kept]
-        self._directions = steps[kept] / self._lengths[:, None]
+        has_length = lengths > 0
+        self._starts, self._lengths = corners[:-1][has_length], lengths[has_length]
+        self._directions = steps[has_length] / self._lengths[:, None]
         self._begins = np.concatenate([[0.0], np.cumsum(self._lengths)[:-1]])
         self.length = float(self._lengths.sum())
         self._closed = course.is_closed
@@ -265,16 +267,16 @@ class _Line:
         progress, distance, _ = self._measure_from(float(point[0]), float(point[1]))
         return float(progress[int(np.argmin(distance))])
 
-    def step(self, x: float, y: float, at: float, window: float) -> tuple[float, float]:
-        """Return the nearest place in the window around ``at``, and the signed distance to it."""
+    def step(self, x: float, y: float, position: float, window: float) -> tuple[float, float]:
+        """Return the nearest place in the window around ``position``, and the signed distance to it."""
         progress, distance, side = self._measure_from(x, y)
         if self._closed:
-            progress = at + (progress - at + self.length / 2) % self.length - self.length / 2
-        allowed = np.abs(progress - at) <= window
-        if not allowed.any():
-            allowed = np.abs(progress - at) == np.min(np.abs(progress - at))
-        best = int(np.argmin(np.where(allowed, distance, np.inf)))
-        return float(progress[best]), float(np.copysign(distance[best], side[best]))
+            progress = position + (progress - position + self.length / 2) % self.length - self.length / 2
+        is_allowed = np.abs(progress - position) <= window
+        if not is_allowed.any():
+            is_allowed = np.abs(progress - position) == np.min(np.abs(progress - position))
+        nearest_index = int(np.argmin(np.where(is_allowed, distance, np.inf)))
+        return float(progress[nearest_index]), float(np.copysign(distance[nearest_index], side[nearest_index]))
 
     def _measure_from(self, x: float, y: float) -> tuple[Floats, Floats, Floats]:
         """Return for each segment the nearest place, the distance to it, and the side (positive to the left)."""

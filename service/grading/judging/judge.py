@@ -23,8 +23,10 @@ _EMPTY_ANALYSIS = StaticAnalysis()
 
 def _collect_judges() -> Mapping[type[Criterion], Judge]:
     families = {schema.__module__.rpartition(".")[2] for schema in SCHEMAS.values()}
-    declared = [vars(import_module(f"{__package__}.{family}")).values() for family in families]
-    return MappingProxyType({each.schema: each for values in declared for each in values if isinstance(each, Judge)})
+    module_values = [vars(import_module(f"{__package__}.{family}")).values() for family in families]
+    return MappingProxyType(
+        {each.schema: each for values in module_values for each in values if isinstance(each, Judge)}
+    )
 
 
 #: The judge of each schema.
@@ -66,7 +68,7 @@ def order_criteria(assignment: Assignment) -> list[Criterion]:
 
 def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
     """Judge one criterion. If a part that it needs was not submitted, it gets no marks."""
-    missing = case.analysis.missing
-    if missing in criterion.parts_needed:
-        return judge_once(criterion, fail_with(f"There is no {PART_FILES[missing]}."))
+    missing_part = case.analysis.missing
+    if missing_part in criterion.parts_needed:
+        return judge_once(criterion, fail_with(f"There is no {PART_FILES[missing_part]}."))
     return JUDGES[type(criterion)].judge(criterion, case)

@@ -79,21 +79,21 @@ class Judge:
 def declare_judge(schema: type[C]) -> Callable[[Callable[[C, TrialResult], Outcome]], Judge]:
     """Declare the judge of a schema that needs only one trial at a time."""
 
-    def declared(judge: Callable[[C, TrialResult], Outcome]) -> Judge:
+    def decorator(judge: Callable[[C, TrialResult], Outcome]) -> Judge:
         return Judge(
             schema, lambda criterion, case: judge_by_trial(criterion, case, lambda _, trial: judge(criterion, trial))
         )
 
-    return declared
+    return decorator
 
 
 def declare_case_judge(schema: type[C]) -> Callable[[Callable[[C, Case], CriterionResult]], Judge]:
     """Declare the judge of a schema that needs several trials, or none."""
 
-    def declared(judge: Callable[[C, Case], CriterionResult]) -> Judge:
+    def decorator(judge: Callable[[C, Case], CriterionResult]) -> Judge:
         return Judge(schema, judge)
 
-    return declared
+    return decorator
 
 
 def summarise_trials(trials: IndexedTrials, outcomes: Sequence[Outcome]) -> str:
@@ -112,25 +112,25 @@ def summarise_trials(trials: IndexedTrials, outcomes: Sequence[Outcome]) -> str:
 def judge_by_trial(
     criterion: Criterion,
     case: Case,
-    outcome_of: Callable[[int, TrialResult], Outcome],
-    told: SummaryWriter = summarise_trials,
+    get_outcome: Callable[[int, TrialResult], Outcome],
+    summarise: SummaryWriter = summarise_trials,
 ) -> CriterionResult:
-    """Combine the outcomes of the trials into a result. ``outcome_of`` gets the trial's index in the grade."""
+    """Combine the outcomes of the trials into a result. ``get_outcome`` gets the trial's index in the grade."""
     trials = case.list_trials(criterion)
-    outcomes = [outcome_of(index, trial) for index, trial in trials]
+    outcomes = [get_outcome(index, trial) for index, trial in trials]
     share = combine_outcomes(outcomes, criterion.over)
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
         marks=compute_marks(criterion.marks, round_to_steps(share) if has_hidden(trials) else share),
         max_marks=criterion.marks,
-        message=told(trials, outcomes),
+        message=summarise(trials, outcomes),
         visibility=criterion.visibility,
         evidence=tuple(
             Evidence(index, outcome.passed, outcome.message, outcome.t, outcome.pose, outcome.measures)
             for (index, _), outcome in zip(trials, outcomes, strict=True)
         ),
-        shown=_build_visible_feedback(trials, outcomes, told),
+        shown=_build_visible_feedback(trials, outcomes, summarise),
     )
 
 
@@ -149,11 +149,11 @@ def judge_once(criterion: Criterion, outcome: Outcome) -> CriterionResult:
 
 
 def _build_visible_feedback(
-    trials: IndexedTrials, outcomes: Sequence[Outcome], told: SummaryWriter
+    trials: IndexedTrials, outcomes: Sequence[Outcome], summarise: SummaryWriter
 ) -> VisibleFeedback | None:
     """Return the feedback for students if some trials are hidden; otherwise None."""
-    places = [place for place, (_, trial) in enumerate(trials) if trial.visibility == "visible"]
-    if len(places) == len(trials):
+    indices = [place for place, (_, trial) in enumerate(trials) if trial.visibility == "visible"]
+    if len(indices) == len(trials):
         return None
-    words = told([trials[place] for place in places], [outcomes[place] for place in places]) if places else ""
-    return VisibleFeedback(add_hidden_note(words))
+    message = summarise([trials[place] for place in indices], [outcomes[place] for place in indices]) if indices else ""
+    return VisibleFeedback(add_hidden_note(message))

@@ -44,14 +44,14 @@ def decode_label(image: Image, greys: Mapping[int, str], light_noise: float = 0.
     """
     if not greys or len(image.right) != 4 * image.side**2:
         return None
-    seen = crop_focus(image.right, image.side).astype(np.float64)
-    median = float(np.median(seen))
+    pixels = crop_focus(image.right, image.side).astype(np.float64)
+    median = float(np.median(pixels))
     grey = min(greys, key=lambda known: abs(known - median))
-    between = min((after - before for before, after in pairwise(sorted(greys))), default=256)
-    if abs(grey - median) > min(_TOLERANCE, between / 2):
+    min_gap = min((after - before for before, after in pairwise(sorted(greys))), default=256)
+    if abs(grey - median) > min(_TOLERANCE, min_gap / 2):
         return None
-    alike = np.abs(seen - median) <= 2 * light_noise + _SLACK
-    return greys[grey] if alike.mean() >= _UNIFORM_SHARE else None
+    is_alike = np.abs(pixels - median) <= 2 * light_noise + _SLACK
+    return greys[grey] if is_alike.mean() >= _UNIFORM_SHARE else None
 
 
 def crop_focus(rgba: bytes, side: int) -> NDArray[np.uint8]:

@@ -76,31 +76,31 @@ def judge_within_limits(
         Exception: Whatever ``heartbeat`` raises.
     """
     reject_failed_trials(trials)
-    left = order_criteria(assignment)
+    remaining_criteria = order_criteria(assignment)
     results: dict[str, CriterionResult] = {}
     case = Case(assignment, trials, analysis, results)
     if _is_small(trials):
         # The process below finds any problem again.
         with suppress(Exception, _TimeLimitExpired), _guarded():
-            while left:
-                results[left[0].id] = judge_one(left[0], case)
-                del left[0]
+            while remaining_criteria:
+                results[remaining_criteria[0].id] = judge_one(remaining_criteria[0], case)
+                del remaining_criteria[0]
     killed_at = ""
-    while left:
+    while remaining_criteria:
         judging = _JudgingProcess(bounds, case, results)
-        frames, status = _run_in_process(lambda: judging.judge_criteria(left), heartbeat)  # noqa: B023 - called at once
+        frames, status = _run_in_process(lambda: judging.judge_criteria(remaining_criteria), heartbeat)  # noqa: B023 - called at once
         for frame in frames:
             result: CriterionResult = _Unpickler(io.BytesIO(frame), trials).load()
             results[result.id] = result
-        del left[: len(frames)]
-        if not left:
+        del remaining_criteria[: len(frames)]
+        if not remaining_criteria:
             break
         # Killed from outside, for example when the machine is out of memory. Once, this may not be the criterion's
         # fault.
-        if _find_ending_signal(status) == signal.SIGKILL and killed_at != left[0].id:
-            killed_at = left[0].id
+        if _find_ending_signal(status) == signal.SIGKILL and killed_at != remaining_criteria[0].id:
+            killed_at = remaining_criteria[0].id
             continue
-        criterion = left.pop(0)
+        criterion = remaining_criteria.pop(0)
         results[criterion.id] = _build_unjudged_result(criterion, _describe_cause(status, bounds))
     return tuple(results[criterion.id] for criterion in assignment.criteria)
 
@@ -126,8 +126,8 @@ def collect_within_limits(
         with suppress(Exception):
             yield pickle.dumps(find())
 
-    told, _ = _run_in_process(frames, heartbeat)
-    return pickle.loads(told[0]) if told else ()
+    output_frames, _ = _run_in_process(frames, heartbeat)
+    return pickle.loads(output_frames[0]) if output_frames else ()
 
 
 def _is_small(trials: Sequence[TrialResult]) -> bool:
@@ -143,11 +143,11 @@ class _TimeLimitExpired(BaseException):
 def _guarded() -> Iterator[None]:
     """Apply small time and memory limits. Raises _Late or MemoryError in code that exceeds them."""
 
-    def late(*_: object) -> NoReturn:
+    def raise_timeout(*_: object) -> NoReturn:
         raise _TimeLimitExpired
 
-    before = {number: signal.signal(number, late) or signal.SIG_DFL for number in _LIMIT_SIGNALS}
-    memory = _limit_memory(_SMALL_LIMITS.memory_bytes)
+    previous_handlers = {number: signal.signal(number, raise_timeout) or signal.SIG_DFL for number in _LIMIT_SIGNALS}
+    memory_limits = _limit_memory(_SMALL_LIMITS.memory_bytes)
     _set_timers(_SMALL_LIMITS.cpu_seconds, _SMALL_LIMITS.seconds)
     try:
         try:
@@ -157,8 +157,8 @@ def _guarded() -> Iterator[None]:
     finally:
         # Stop the timers again, in case one expired on the way here.
         _set_timers(0, 0)
-        resource.setrlimit(resource.RLIMIT_AS, memory)
-        for number, handler in before.items():
+        resource.setrlimit(resource.RLIMIT_AS, memory_limits)
+        for number, handler in previous_handlers.items():
             signal.signal(number, handler)
 
 
@@ -167,8 +167,8 @@ def _count_written_characters(trials: Sequence[TrialResult]) -> int:
     recordings = [trial.recording for trial in trials]
     lines = (line.text for recording in recordings for line in (*recording.printed, *recording.spoken))
     messages = (message.text for recording in recordings for message in recording.messages)
-    of_agents = (message.text for recording in recordings for message in recording.agent_messages)
-    texts = (*lines, *of_agents, *(text for text in messages if not text.startswith(_IMAGE)))
+    agent_texts = (message.text for recording in recordings for message in recording.agent_messages)
+    texts = (*lines, *agent_texts, *(text for text in messages if not text.startswith(_IMAGE)))
     return sum(map(len, texts)) + _CHARACTERS_PER_TEXT * len(texts)
 
 
@@ -189,9 +189,9 @@ class _JudgingProcess:
             yield _pickle_result(result, self.case.trials)
 
     def _judge_criterion(self, criterion: Criterion) -> CriterionResult:
-        of = self.results.get(criterion.result_needed or "")
-        if of is not None and of.unjudged:
-            return _build_unjudged_result(criterion, f"{of.id}, which it ranks, could not be judged")
+        ranked_result = self.results.get(criterion.result_needed or "")
+        if ranked_result is not None and ranked_result.unjudged:
+            return _build_unjudged_result(criterion, f"{ranked_result.id}, which it ranks, could not be judged")
         try:
             return judge_one(criterion, self.case)
         except MemoryError:
@@ -219,14 +219,18 @@ def _set_timers(cpu_seconds: float, seconds: float) -> None:
     signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
-def _limit_memory(more: int) -> tuple[int, int]:
-    """Limit this process to ``more`` bytes beyond its mapped memory, and return the previous limits."""
-    mapped = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    most = before[1]
-    allowed = mapped + more if most == resource.RLIM_INFINITY else min(mapped + more, most)
-    resource.setrlimit(resource.RLIMIT_AS, (allowed, most))
-    return before
+def _limit_memory(extra_bytes: int) -> tuple[int, int]:
+    """Limit this process to ``extra_bytes`` bytes beyond its mapped memory, and return the previous limits."""
+    mapped_bytes = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    previous_limits = resource.getrlimit(resource.RLIMIT_AS)
+    hard_limit = previous_limits[1]
+    memory_limit = (
+        mapped_bytes + extra_bytes
+        if hard_limit == resource.RLIM_INFINITY
+        else min(mapped_bytes + extra_bytes, hard_limit)
+    )
+    resource.setrlimit(resource.RLIMIT_AS, (memory_limit, hard_limit))
+    return previous_limits
 
 
 def _run_in_process(work: Callable[[], Iterator[bytes]], heartbeat: Callable[[], None]) -> tuple[list[bytes], int]:
@@ -243,23 +247,23 @@ def _run_in_process(work: Callable[[], Iterator[bytes]], heartbeat: Callable[[],
     os.close(writer)
     status = None
     try:
-        told = b"".join(_read_pipe(reader, heartbeat))
+        output = b"".join(_read_pipe(reader, heartbeat))
         _, status = os.waitpid(pid, 0)
     finally:
         os.close(reader)
         if status is None:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
-    return list(_split_frames(told)), status
+    return list(_split_frames(output)), status
 
 
 def _run_and_exit(work: Callable[[], Iterator[bytes]], writer: int) -> NoReturn:
     try:
-        with os.fdopen(writer, "wb") as out, suppress(BrokenPipeError):
+        with os.fdopen(writer, "wb") as pipe, suppress(BrokenPipeError):
             for frame in work():
-                out.write(_FRAME.pack(len(frame)))
-                out.write(frame)
-                out.flush()
+                pipe.write(_FRAME.pack(len(frame)))
+                pipe.write(frame)
+                pipe.flush()
     finally:
         # Skip the parent's exit handlers.
         os._exit(0)
@@ -277,14 +281,14 @@ def _read_pipe(reader: int, heartbeat: Callable[[], None]) -> Iterator[bytes]:
         heartbeat()
 
 
-def _split_frames(told: bytes) -> Iterator[bytes]:
+def _split_frames(data: bytes) -> Iterator[bytes]:
     """Yield the complete frames. A frame cut off at the end is ignored."""
-    place = 0
-    while place + _FRAME.size <= len(told):
-        begin = place + _FRAME.size
-        place = begin + _FRAME.unpack_from(told, place)[0]
-        if place <= len(told):
-            yield told[begin:place]
+    offset = 0
+    while offset + _FRAME.size <= len(data):
+        start = offset + _FRAME.size
+        offset = start + _FRAME.unpack_from(data, offset)[0]
+        if offset <= len(data):
+            yield data[start:offset]
 
 
 class _Pickler(pickle.Pickler):
@@ -303,8 +307,8 @@ class _Unpickler(pickle.Unpickler):
         super().__init__(file)
         self._trials = trials
 
-    def persistent_load(self, place: tuple[int, int]) -> Image:
-        trial, number = place
+    def persistent_load(self, position: tuple[int, int]) -> Image:
+        trial, number = position
         return self._trials[trial].recording.images[number]
 
 
@@ -338,9 +342,13 @@ def _find_ending_signal(status: int) -> int:
 
 
 def _describe_cause(status: int, bounds: JudgingLimits) -> str:
-    ended_by = _find_ending_signal(status)
-    if ended_by == signal.SIGPROF:
+    signal_number = _find_ending_signal(status)
+    if signal_number == signal.SIGPROF:
         return f"it took more than {bounds.cpu_seconds:.0f} s of computing"
-    if ended_by == signal.SIGALRM:
+    if signal_number == signal.SIGALRM:
         return f"it took more than {bounds.seconds:.0f} s"
-    return f"its process was ended by signal {ended_by}" if ended_by else "its process ended before it was judged"
+    return (
+        f"its process was ended by signal {signal_number}"
+        if signal_number
+        else "its process ended before it was judged"
+    )

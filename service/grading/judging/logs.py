@@ -33,17 +33,18 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     """Judge the samples of one datalog series; if required, only those that a sensor read."""
     recording = trial.recording
     name = criterion.series
-    logged = [datum for datum in recording.datalog if datum.name == name]
-    true = _filter_measured_samples(criterion, logged, recording)
-    samples = true if criterion.measured is None else _drop_repeats(true)
-    made_up = len(logged) - len(true)
+    logged_samples = [datum for datum in recording.datalog if datum.name == name]
+    measured_samples = _filter_measured_samples(criterion, logged_samples, recording)
+    samples = measured_samples if criterion.measured is None else _drop_repeats(measured_samples)
+    invented_count = len(logged_samples) - len(measured_samples)
     values = [datum.value for datum in samples]
     measures = (Measure("samples", float(len(values))), *_measure_extremes(values))
     if criterion.measured is not None:
-        measures += (Measure("made up", float(made_up)),)
-    if logged and not values:
+        measures += (Measure("made up", float(invented_count)),)
+    if logged_samples and not values:
         return fail_with(
-            f"Expected {name} to be readings of {_describe_instrument(criterion)}, but all {len(logged)} samples "
+            f"Expected {name} to be readings of {_describe_instrument(criterion)}, but all {len(logged_samples)} "
+            "samples "
             "are made up: "
             "none matches the reading at the time of printing.",
             measures=measures,
@@ -55,19 +56,21 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     checks = _check_datalog(criterion, samples, recording)
     if criterion.plateaus:
         checks.append(_check_plateaus(criterion, values))
-    wrong = next((words for reached, words in checks if reached < 1), None)
-    told = (
-        f"; {made_up} of {len(logged)} are made up, not readings of {_describe_instrument(criterion)}"
-        if made_up
+    problem = next((words for reached, words in checks if reached < 1), None)
+    remark = (
+        f"; {invented_count} of {len(logged_samples)} are made up, not readings of {_describe_instrument(criterion)}"
+        if invented_count
         else ""
     )
-    if wrong is None:
-        outcome = pass_with(f"The program logged {len(values)} samples of {name} as expected{told}.", measures=measures)
+    if problem is None:
+        outcome = pass_with(
+            f"The program logged {len(values)} samples of {name} as expected{remark}.", measures=measures
+        )
     else:
         score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
-        outcome = fail_with(f"{wrong}{told}.", score=score, measures=measures)
+        outcome = fail_with(f"{problem}{remark}.", score=score, measures=measures)
     return apply_stray_penalty(
-        outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", made_up)
+        outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", invented_count)
     )
 
 
@@ -77,14 +80,14 @@ def _describe_instrument(criterion: Datalog) -> str:
 
 
 def _filter_measured_samples(
-    criterion: Datalog, logged: Sequence[DatalogEntry], recording: Recording
+    criterion: Datalog, logged_samples: Sequence[DatalogEntry], recording: Recording
 ) -> list[DatalogEntry]:
     """Return the samples that the instrument read; all if the criterion names none."""
     if criterion.measured is None:
-        return list(logged)
-    values, at = [datum.value for datum in logged], [datum.t for datum in logged]
-    read = match_readings(values, at, (criterion.measured,), recording)
-    return [datum for datum, true in zip(logged, read.tolist(), strict=True) if true]
+        return list(logged_samples)
+    values, times = [datum.value for datum in logged_samples], [datum.t for datum in logged_samples]
+    is_read = match_readings(values, times, (criterion.measured,), recording)
+    return [datum for datum, true in zip(logged_samples, is_read.tolist(), strict=True) if true]
 
 
 def _format_image_count(count: int) -> str:
@@ -101,51 +104,58 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     recording = trial.recording
     log = recording.image_log
     checks: list[Check] = []
-    for side, count, least in (
+    for side, count, minimum in (
         ("left", criterion.left, criterion.left_at_least),
         ("right", criterion.right, criterion.right_at_least),
     ):
-        got = sum(entry[0] == side for entry in log)
-        asked = f"at least {_format_image_count(least)}" if count is None else _format_image_count(count)
-        words = f"Expected {asked} of the {side} sensor to be logged, but {_format_there_are(got)}"
-        if count is not None or least:
-            reached = min(Fraction(got, least), Fraction(1)) if count is None else Fraction(got == count)
-            checks.append((reached, words))
+        actual_count = sum(entry[0] == side for entry in log)
+        expectation = f"at least {_format_image_count(minimum)}" if count is None else _format_image_count(count)
+        message = f"Expected {expectation} of the {side} sensor to be logged, but {_format_there_are(actual_count)}"
+        if count is not None or minimum:
+            share = (
+                min(Fraction(actual_count, minimum), Fraction(1)) if count is None else Fraction(actual_count == count)
+            )
+            checks.append((share, message))
     if criterion.pairs:
         sides = [entry[0] for entry in log]
-        turns = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
-        checks.append(
-            (Fraction(turns), "Expected left and right images to alternate, but they did not (image_data both)")
-        )
-    if criterion.at_start:
-        moved = next((entry for entry in log if not _is_start_image(entry, recording, trial.light_noise)), None)
-        where = _describe_position(recording, moved[2]) if moved else ""
+        is_alternating = bool(sides) and sides == ["left", "right"] * (len(sides) // 2)
         checks.append(
             (
-                Fraction(bool(log) and moved is None),
-                f"Expected every image to be taken at the start pose, but {where or 'there is none'}",
+                Fraction(is_alternating),
+                "Expected left and right images to alternate, but they did not (image_data both)",
+            )
+        )
+    if criterion.at_start:
+        moved_image = next((entry for entry in log if not _is_start_image(entry, recording, trial.light_noise)), None)
+        position_text = _describe_position(recording, moved_image[2]) if moved_image else ""
+        checks.append(
+            (
+                Fraction(bool(log) and moved_image is None),
+                f"Expected every image to be taken at the start pose, but {position_text or 'there is none'}",
             )
         )
     if criterion.uniform is not None:
-        own = [entry for entry in log if entry[0] == criterion.uniform]
-        flat = bool(own) and all(_is_uniform(entry[1]) and _has_content(entry, recording) for entry in own)
+        side_images = [entry for entry in log if entry[0] == criterion.uniform]
+        is_uniform = bool(side_images) and all(
+            _is_uniform(entry[1]) and _has_content(entry, recording) for entry in side_images
+        )
         checks.append(
             (
-                Fraction(flat),
+                Fraction(is_uniform),
                 f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
                 "or shows no label's patch",
             )
         )
     measures = (Measure("images", float(len(log))),)
-    wrong = next((words for reached, words in checks if reached < 1), None)
-    if wrong is None:
+    problem = next((words for reached, words in checks if reached < 1), None)
+    if problem is None:
         return pass_with(
             f"The program logged {len(log)} {'image' if len(log) == 1 else 'images'} as expected.", measures=measures
         )
-    last = tick_to_seconds(recording, log[-1][2]) if log else None
-    pose = None if last is None else get_pose_at(recording, last)
-    held = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
-    return fail_with(f"{wrong}.", last, pose, held if log else Fraction(0), measures)
+    last_time = tick_to_seconds(recording, log[-1][2]) if log else None
+    pose = None if last_time is None else get_pose_at(recording, last_time)
+    score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
+    return fail_with(f"{problem}.", last_time, pose, score if log else Fraction(0), measures)
 
 
 def _measure_extremes(values: Sequence[float]) -> tuple[Measure, ...]:
@@ -159,53 +169,58 @@ def _check_datalog(criterion: Datalog, samples: Sequence[DatalogEntry], recordin
     values = [datum.value for datum in samples]
     checks: list[Check] = []
     if criterion.at_least > 1:
-        words = f"Expected at least {criterion.at_least} samples of {name}, but there are {count}"
-        checks.append((min(Fraction(count, criterion.at_least), Fraction(1)), words))
+        message = f"Expected at least {criterion.at_least} samples of {name}, but there are {count}"
+        checks.append((min(Fraction(count, criterion.at_least), Fraction(1)), message))
     if criterion.at_most is not None:
-        most = criterion.at_most
-        checks.append((Fraction(count <= most), f"Expected at most {most} samples of {name}, but there are {count}"))
-    if criterion.timed:
-        timed = Fraction(sum(datum.simtime is not None for datum in samples), max(count, 1))
+        max_count = criterion.at_most
         checks.append(
-            (timed, f'Expected every sample of {name} to have its time ("{name}: 42 1.5"), but some have none')
+            (Fraction(count <= max_count), f"Expected at most {max_count} samples of {name}, but there are {count}")
+        )
+    if criterion.timed:
+        timed_share = Fraction(sum(datum.simtime is not None for datum in samples), max(count, 1))
+        checks.append(
+            (timed_share, f'Expected every sample of {name} to have its time ("{name}: 42 1.5"), but some have none')
         )
     if criterion.between is not None:
-        least, greatest = criterion.between
-        strays = [value for value in values if not least <= value <= greatest]
-        stray = f"{strays[0]:g}" if strays else ""
-        words = f"Expected {name} to stay between {least:g} and {greatest:g}, but it was {stray} once"
-        checks.append((Fraction(count - len(strays), max(count, 1)), words))
+        minimum, maximum = criterion.between
+        strays = [value for value in values if not minimum <= value <= maximum]
+        stray_text = f"{strays[0]:g}" if strays else ""
+        message = f"Expected {name} to stay between {minimum:g} and {maximum:g}, but it was {stray_text} once"
+        checks.append((Fraction(count - len(strays), max(count, 1)), message))
     if criterion.covers is not None and values:
         low, high = criterion.covers
-        words = f"Expected {name} to go from {low:g} to {high:g}, but it went from {min(values):g} to {max(values):g}"
-        checks.append((Fraction(min(values) <= low and max(values) >= high), words))
+        message = f"Expected {name} to go from {low:g} to {high:g}, but it went from {min(values):g} to {max(values):g}"
+        checks.append((Fraction(min(values) <= low and max(values) >= high), message))
     if criterion.dips_below is not None:
-        others = [datum.value for datum in recording.datalog if datum.name == criterion.dips_below]
-        deeper = bool(others) and bool(values) and min(values) < min(others)
-        words = f"Expected the lowest {name} to be below the lowest {criterion.dips_below}, but it is not"
-        checks.append((Fraction(deeper), words))
+        other_values = [datum.value for datum in recording.datalog if datum.name == criterion.dips_below]
+        is_deeper = bool(other_values) and bool(values) and min(values) < min(other_values)
+        message = f"Expected the lowest {name} to be below the lowest {criterion.dips_below}, but it is not"
+        checks.append((Fraction(is_deeper), message))
     return checks
 
 
 def _check_plateaus(criterion: Datalog, values: Sequence[float]) -> Check:
-    found, count = _count_ordered_plateaus(criterion, values), len(criterion.plateaus)
+    plateau_count, count = _count_ordered_plateaus(criterion, values), len(criterion.plateaus)
     series = ", ".join(f"{value:g}" for value in criterion.plateaus)
-    before = f"after {criterion.plateaus[found - 1]:g} " if found else ""
-    missing = criterion.plateaus[min(found, count - 1)]
-    words = f"Expected {criterion.series} to stay at {series} in this order, but {before}it never stayed at {missing:g}"
-    return Fraction(found, count), words
+    order_clause = f"after {criterion.plateaus[plateau_count - 1]:g} " if plateau_count else ""
+    missing_plateau = criterion.plateaus[min(plateau_count, count - 1)]
+    message = (
+        f"Expected {criterion.series} to stay at {series} in this order, "
+        f"but {order_clause}it never stayed at {missing_plateau:g}"
+    )
+    return Fraction(plateau_count, count), message
 
 
 def _count_ordered_plateaus(criterion: Datalog, values: Sequence[float]) -> int:
     """Return how many of the plateaus come in order."""
-    place = 0
-    for found, wanted in enumerate(criterion.plateaus):
-        run = 0
-        while place < len(values) and run < criterion.plateau_samples:
-            run = run + 1 if abs(values[place] - wanted) <= criterion.tolerance + 1e-9 else 0
-            place += 1
-        if run < criterion.plateau_samples:
-            return found
+    index = 0
+    for plateau_count, plateau in enumerate(criterion.plateaus):
+        run_length = 0
+        while index < len(values) and run_length < criterion.plateau_samples:
+            run_length = run_length + 1 if abs(values[index] - plateau) <= criterion.tolerance + 1e-9 else 0
+            index += 1
+        if run_length < criterion.plateau_samples:
+            return plateau_count
     return len(criterion.plateaus)
 
 
@@ -216,24 +231,27 @@ def _is_start_image(entry: tuple[str, str, int], recording: Recording, noise: fl
         pose = get_pose_after(recording, entry[2])
         return math.dist((pose.x, pose.y), (recording.start.x, recording.start.y)) < 1
     side, csv, _ = entry
-    which: Side = "left" if side == "left" else "right"
-    sensor = find_light_sensor(recording, which)
-    expected = _crop_floor(floor, locate_footprint(recording, which, recording.start), sensor.diameter)
-    found = _parse_pixels(csv, sensor.diameter)
-    if found is None:
+    sensor_side: Side = "left" if side == "left" else "right"
+    sensor = find_light_sensor(recording, sensor_side)
+    expected = _crop_floor(floor, locate_footprint(recording, sensor_side, recording.start), sensor.diameter)
+    actual = _parse_pixels(csv, sensor.diameter)
+    if actual is None:
         return False
     mask = build_sensor_mask(sensor.diameter)
-    return bool((np.abs(found[mask] - expected[mask]) <= noise).all())
+    return bool((np.abs(actual[mask] - expected[mask]) <= noise).all())
 
 
-def _crop_floor(floor: Floor, where: Footprint, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def _crop_floor(floor: Floor, footprint: Footprint, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
     """Return the RGB under a sensor of that many pixels, shape (side, side, 3), black off the floor."""
     crop = np.zeros((side, side, 3), np.int64)
-    top, left = max(where.row, 0), max(where.column, 0)
-    bottom, right = min(where.row + side, HEIGHT), min(where.column + side, WIDTH)
+    top, left = max(footprint.row, 0), max(footprint.column, 0)
+    bottom, right = min(footprint.row + side, HEIGHT), min(footprint.column + side, WIDTH)
     if top < bottom and left < right:
-        place = (slice(top - where.row, bottom - where.row), slice(left - where.column, right - where.column))
-        crop[place] = floor.pixels[top:bottom, left:right]
+        window = (
+            slice(top - footprint.row, bottom - footprint.row),
+            slice(left - footprint.column, right - footprint.column),
+        )
+        crop[window] = floor.pixels[top:bottom, left:right]
     return crop
 
 
@@ -272,8 +290,8 @@ _READING_SECONDS = 0.01
 
 def _drop_repeats(samples: Sequence[DatalogEntry]) -> list[DatalogEntry]:
     """Return the samples without those printed sooner than a reading takes."""
-    found: list[DatalogEntry] = []
+    distinct_samples: list[DatalogEntry] = []
     for datum in samples:
-        if not (found and datum.t < found[-1].t + _READING_SECONDS - 1e-9):
-            found.append(datum)
-    return found
+        if not (distinct_samples and datum.t < distinct_samples[-1].t + _READING_SECONDS - 1e-9):
+            distinct_samples.append(datum)
+    return distinct_samples

@@ -12,16 +12,16 @@ from collections.abc import Callable, Sequence
 MatchMatrix = Sequence[Sequence[bool]]
 
 
-def match_most_pairs(suits: MatchMatrix) -> list[int | None]:
+def match_most_pairs(matches: MatchMatrix) -> list[int | None]:
     """Return the candidate of each requirement, None without one, with as many pairs as possible.
 
     Uses maximum bipartite matching by augmenting paths. Among equal solutions, earlier requirements get candidates.
     """
-    pairs: list[int | None] = [None] * len(suits)
+    pairs: list[int | None] = [None] * len(matches)
     owners: dict[int, int] = {}
-    for wish in range(len(suits)):
+    for wish in range(len(matches)):
         reached_from: dict[int, int] = {}
-        candidate = _find_free_candidate(wish, suits, owners, reached_from)
+        candidate = _find_free_candidate(wish, matches, owners, reached_from)
         while candidate is not None:
             owner = reached_from[candidate]
             pairs[owner], owners[candidate], candidate = candidate, owner, pairs[owner]
@@ -29,18 +29,18 @@ def match_most_pairs(suits: MatchMatrix) -> list[int | None]:
 
 
 def _find_free_candidate(
-    wish: int, suits: MatchMatrix, owners: dict[int, int], reached_from: dict[int, int]
+    wish: int, matches: MatchMatrix, owners: dict[int, int], reached_from: dict[int, int]
 ) -> int | None:
     """Return the nearest candidate without an owner, and record which requirement reached each candidate."""
-    waiting = deque([wish])
-    while waiting:
-        owner = waiting.popleft()
-        new = [place for place, suited in enumerate(suits[owner]) if suited and place not in reached_from]
-        reached_from.update(dict.fromkeys(new, owner))
-        free = next((place for place in new if place not in owners), None)
-        if free is not None:
-            return free
-        waiting.extend(owners[place] for place in new)
+    queue = deque([wish])
+    while queue:
+        owner = queue.popleft()
+        new_candidates = [place for place, suited in enumerate(matches[owner]) if suited and place not in reached_from]
+        reached_from.update(dict.fromkeys(new_candidates, owner))
+        free_candidate = next((place for place in new_candidates if place not in owners), None)
+        if free_candidate is not None:
+            return free_candidate
+        queue.extend(owners[place] for place in new_candidates)
     return None
 
 
@@ -51,31 +51,31 @@ def match_most_in_order(wishes: int, first_from: Callable[[int, int], int | None
     requirement begins ``step`` places further on (0: at the same place). Among equal solutions, earlier requirements
     get places.
     """
-    known: dict[tuple[int, int], tuple[int, int | None]] = {}
+    solutions: dict[tuple[int, int], tuple[int, int | None]] = {}
 
     def count(wish: int, start: int) -> int:
-        return known[wish, start][0] if wish < wishes else 0
+        return solutions[wish, start][0] if wish < wishes else 0
 
-    unexplored = [(0, 0)]
-    while unexplored:
-        wish, start = unexplored[-1]
-        if (wish, start) in known:
-            unexplored.pop()
+    open_states = [(0, 0)]
+    while open_states:
+        wish, start = open_states[-1]
+        if (wish, start) in solutions:
+            open_states.pop()
             continue
-        place = first_from(wish, start)
-        following = [(wish + 1, start)] + ([] if place is None else [(wish + 1, place + step)])
-        missing = [state for state in following if wish + 1 < wishes and state not in known]
-        if missing:
-            unexplored += missing
+        candidate = first_from(wish, start)
+        next_states = [(wish + 1, start)] + ([] if candidate is None else [(wish + 1, candidate + step)])
+        missing_states = [state for state in next_states if wish + 1 < wishes and state not in solutions]
+        if missing_states:
+            open_states += missing_states
             continue
-        without = count(wish + 1, start)
-        with_it = -1 if place is None else 1 + count(wish + 1, place + step)
-        known[wish, start] = max(with_it, without), place if with_it >= without else None
-        unexplored.pop()
+        count_without = count(wish + 1, start)
+        count_with = -1 if candidate is None else 1 + count(wish + 1, candidate + step)
+        solutions[wish, start] = max(count_with, count_without), candidate if count_with >= count_without else None
+        open_states.pop()
     places: list[int | None] = []
     start = 0
     for wish in range(wishes):
-        place = known[wish, start][1]
-        places.append(place)
-        start = start if place is None else place + step
+        candidate = solutions[wish, start][1]
+        places.append(candidate)
+        start = start if candidate is None else candidate + step
     return places

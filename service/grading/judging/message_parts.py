@@ -19,34 +19,37 @@ def quote_text(text: str) -> str:
     return f'"{line}"' if len(line) <= _LONGEST_QUOTE else f'"{line[: _LONGEST_QUOTE - 3]}..."'
 
 
-def quote_list(texts: tuple[str, ...], word: str = "and") -> str:
+def quote_list(texts: tuple[str, ...], conjunction: str = "and") -> str:
     """Return a list such as ``"a", "b" and "c"``."""
     quotes = [quote_text(text) for text in texts]
-    return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {word} {quotes[-1]}"
+    return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {conjunction} {quotes[-1]}"
 
 
 def describe_fault(fault: Fault) -> str:
     """Return a fault as ``NameError: name 'x' is not defined (line 3)``."""
-    where = f" ({fault.place})" if fault.place else ""
-    return f"{fault.message.rstrip('.')}{where}"
+    position = f" ({fault.place})" if fault.place else ""
+    return f"{fault.message.rstrip('.')}{position}"
 
 
 def describe_place(trial: TrialResult, t: float | None) -> str:
     """Return a place as ``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
     start = trial.recording.start
     x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
-    words = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
+    clauses = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
     if trial.light_noise:
-        words.append(f"with light noise {trial.light_noise:g}")
+        clauses.append(f"with light noise {trial.light_noise:g}")
     if trial.motor_noise:
-        words.append(f"with motor noise {trial.motor_noise:g}")
+        clauses.append(f"with motor noise {trial.motor_noise:g}")
     for condition, level in trial.sweep:
         if condition in ("loss", "delay") and level:
-            about = CONDITIONS[condition]
-            words.append(f"with a {about.words} of {level:g}" + (f" {about.unit}" if condition == "delay" else ""))
+            condition_info = CONDITIONS[condition]
+            clauses.append(
+                f"with a {condition_info.words} of {level:g}"
+                + (f" {condition_info.unit}" if condition == "delay" else "")
+            )
     if t is not None:
-        words.append(f"at {t:.2f} s")
-    return ", ".join(words)
+        clauses.append(f"at {t:.2f} s")
+    return ", ".join(clauses)
 
 
 def add_hidden_note(message: str) -> str:

@@ -49,134 +49,149 @@ _REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
 def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
     """Judge the motion from start to end. Wheel positions are those that the program would read at the end."""
     recording = trial.recording
-    whole = build_move(recording, 0, len(recording.ticks))
-    left, right = _read_wheel_positions(recording)
-    expected = abs(left) / 360 * math.pi * get_recorded_robot(recording).wheel_diameter
+    total_move = build_move(recording, 0, len(recording.ticks))
+    left_position, right_position = _read_wheel_positions(recording)
+    expected_distance = abs(left_position) / 360 * math.pi * get_recorded_robot(recording).wheel_diameter
     measures = (
-        Measure("displacement", whole.distance, "mm"),
-        Measure("displacement forward", whole.forward, "mm"),
-        Measure("displacement sideways", whole.sideways, "mm"),
-        Measure("heading change", whole.turn, "°"),
-        Measure("left wheel", left, "°"),
-        Measure("right wheel", right, "°"),
+        Measure("displacement", total_move.distance, "mm"),
+        Measure("displacement forward", total_move.forward, "mm"),
+        Measure("displacement sideways", total_move.sideways, "mm"),
+        Measure("heading change", total_move.turn, "°"),
+        Measure("left wheel", left_position, "°"),
+        Measure("right wheel", right_position, "°"),
     )
     t, end = recording.end_t, recording.end
-    missed = describe_mismatch(criterion, whole)
-    if missed is not None:
-        return fail_with(f"Expected, from start to end, {missed}.", t, end, measures=measures)
-    for side, wished, value in (("left", criterion.left_wheel, left), ("right", criterion.right_wheel, right)):
-        if wished is not None and not wished[0] <= value <= wished[1]:
+    mismatch = describe_mismatch(criterion, total_move)
+    if mismatch is not None:
+        return fail_with(f"Expected, from start to end, {mismatch}.", t, end, measures=measures)
+    for side, bounds, value in (
+        ("left", criterion.left_wheel, left_position),
+        ("right", criterion.right_wheel, right_position),
+    ):
+        if bounds is not None and not bounds[0] <= value <= bounds[1]:
             return fail_with(
-                f"Expected the {side} wheel's position to be {wished[0]:g} to {wished[1]:g} at the end, "
+                f"Expected the {side} wheel's position to be {bounds[0]:g} to {bounds[1]:g} at the end, "
                 f"but it was {value:.0f}.",
                 t,
                 end,
                 measures=measures,
             )
     share = criterion.agrees_with_wheels
-    if share is not None and not abs(whole.distance - expected) <= share * max(expected, 1e-9):
+    if share is not None and not abs(total_move.distance - expected_distance) <= share * max(expected_distance, 1e-9):
         return fail_with(
-            f"Expected the robot to drive {expected:.0f} mm according to its left wheel's position (within "
-            f"{share:.0%}), but it ended {whole.distance:.0f} mm from its start.",
+            f"Expected the robot to drive {expected_distance:.0f} mm according to its left wheel's position (within "
+            f"{share:.0%}), but it ended {total_move.distance:.0f} mm from its start.",
             t,
             end,
             measures=measures,
         )
-    return pass_with(f"From start to end the robot {whole}.", t, end, measures)
+    return pass_with(f"From start to end the robot {total_move}.", t, end, measures)
 
 
 @declare_judge(Moves)
 def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
     """Judge the moves by searching for each required one among those that were made."""
     recording = trial.recording
-    made = split_moves(recording)
-    found = _match_moves(criterion, made)
-    score = Fraction(sum(move is not None for move in found), len(found))
+    moves = split_moves(recording)
+    matched_moves = _match_moves(criterion, moves)
+    score = Fraction(sum(move is not None for move in matched_moves), len(matched_moves))
     measures = tuple(
         measure
-        for number, move in enumerate(found, 1)
+        for number, move in enumerate(matched_moves, 1)
         if move is not None
         for measure in build_move_measures(move, f"move {number}")
     )
-    missing = next((number for number, move in enumerate(found) if move is None), None)
-    if missing is not None:
-        return _fail_for_missing_move(criterion, recording, made, found, missing, score, measures)
-    others = [move for move in made if move not in found]
-    if criterion.only and others:
-        expected = f"only the {_format_count(len(found), 'move')} expected"
+    missing_index = next((number for number, move in enumerate(matched_moves) if move is None), None)
+    if missing_index is not None:
+        return _fail_for_missing_move(criterion, recording, moves, matched_moves, missing_index, score, measures)
+    extra_moves = [move for move in moves if move not in matched_moves]
+    if criterion.only and extra_moves:
+        expected = f"only the {_format_count(len(matched_moves), 'move')} expected"
         return fail_with(
-            f"Expected {expected}, but the robot also {others[0]}.",
-            *find_place(recording, others[0].first),
+            f"Expected {expected}, but the robot also {extra_moves[0]}.",
+            *find_place(recording, extra_moves[0].first),
             score=score,
             measures=measures,
         )
-    told = "; ".join(str(move) for move in found[:4] if move is not None)
-    return pass_with(f"The robot moved as expected: it {told}.", *find_place(recording, made[-1].last), measures)
+    description = "; ".join(str(move) for move in matched_moves[:4] if move is not None)
+    return pass_with(
+        f"The robot moved as expected: it {description}.", *find_place(recording, moves[-1].last), measures
+    )
 
 
 @declare_judge(Excursions)
 def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
     """Judge the peaks of the motion along the start's heading, and the distance from the start after each."""
     recording = trial.recording
-    ahead = _compute_distance_ahead(recording)
-    turns = _find_turning_points(ahead)
-    outs = [turn for turn in turns if turn.is_outward]
-    wanted = len(criterion.heights)
+    forward_distances = _compute_distance_ahead(recording)
+    turns = _find_turning_points(forward_distances)
+    peaks = [turn for turn in turns if turn.is_outward]
+    required_count = len(criterion.heights)
     measures = tuple(
-        Measure(f"{'peak' if turn.is_outward else 'return'} {number}", float(ahead[turn.row]), "mm")
+        Measure(f"{'peak' if turn.is_outward else 'return'} {number}", float(forward_distances[turn.row]), "mm")
         for out in (True, False)
         for number, turn in enumerate((turn for turn in turns if turn.is_outward is out), 1)
     )[:24]
-    right = Fraction(min(len(outs), wanted), wanted) / 2
-    if len(outs) != wanted:
+    half_score = Fraction(min(len(peaks), required_count), required_count) / 2
+    if len(peaks) != required_count:
         row = turns[-1].row if turns else 0
         return fail_with(
-            f"Expected the robot to go out and come back {_format_times(wanted)}, but it "
-            f"{_describe_repetitions(len(outs))}.",
+            f"Expected the robot to go out and come back {_format_times(required_count)}, but it "
+            f"{_describe_repetitions(len(peaks))}.",
             *find_place(recording, row),
-            score=right,
+            score=half_score,
             measures=measures,
         )
-    unit = sum(abs(float(ahead[turn.row])) for turn in outs) / sum(criterion.heights)
-    for number, (turn, height) in enumerate(zip(outs, criterion.heights, strict=True), 1):
-        reached = abs(float(ahead[turn.row]))
+    unit = sum(abs(float(forward_distances[turn.row])) for turn in peaks) / sum(criterion.heights)
+    for number, (turn, height) in enumerate(zip(peaks, criterion.heights, strict=True), 1):
+        peak_distance = abs(float(forward_distances[turn.row]))
         share = height / criterion.heights[0]
-        least = criterion.at_least * share
-        if reached < least:
+        min_height = criterion.at_least * share
+        if peak_distance < min_height:
             return fail_with(
-                f"Expected the robot to go out at least {least:g} mm the {_format_ordinal(number)} time, "
-                f"but it went {reached:.0f} mm.",
+                f"Expected the robot to go out at least {min_height:g} mm the {_format_ordinal(number)} time, "
+                f"but it went {peak_distance:.0f} mm.",
                 *find_place(recording, turn.row),
-                score=right,
+                score=half_score,
                 measures=measures,
             )
-        if abs(reached - unit * height) > criterion.tolerance * unit * height:
-            ways = ", ".join(f"{abs(float(ahead[each.row])):.0f}" for each in outs)
+        if abs(peak_distance - unit * height) > criterion.tolerance * unit * height:
+            distances = ", ".join(f"{abs(float(forward_distances[each.row])):.0f}" for each in peaks)
             return fail_with(
                 f"Expected the robot to go out {_describe_proportion(criterion.heights)} (within "
                 f"{criterion.tolerance:.0%}), "
-                f"but it went {ways} mm.",
+                f"but it went {distances} mm.",
                 *find_place(recording, turn.row),
-                score=right,
+                score=half_score,
                 measures=measures,
             )
-    away = np.hypot(*(compute_positions(recording) - (recording.start.x, recording.start.y)).T)
+    start_distances = np.hypot(*(compute_positions(recording) - (recording.start.x, recording.start.y)).T)
     # The last return counts at the end of the run, not at the nearest earlier point.
-    back = [*[turn.row for turn in turns if not turn.is_outward][: wanted - 1], len(ahead) - 1]
-    for number, row in enumerate(back, 1):
-        if away[row] > criterion.returns_within:
-            came = f"the {_format_ordinal(number)} time it came back to {format_number(float(away[row]))} mm"
+    return_rows = [
+        *[turn.row for turn in turns if not turn.is_outward][: required_count - 1],
+        len(forward_distances) - 1,
+    ]
+    for number, row in enumerate(return_rows, 1):
+        if start_distances[row] > criterion.returns_within:
+            distance = format_number(float(start_distances[row]))
+            is_last = number >= required_count
+            problem = (
+                f"it ended {distance} mm from it"
+                if is_last
+                else f"the {_format_ordinal(number)} time it came back to {distance} mm"
+            )
             return fail_with(
                 f"Expected the robot to come back to within {criterion.returns_within:g} mm of its start each time, "
-                f"but {came if number < wanted else f'it ended {format_number(float(away[row]))} mm from it'}.",
+                f"but {problem}.",
                 *find_place(recording, row),
-                score=right + Fraction(number - 1, 2 * wanted),
+                score=half_score + Fraction(number - 1, 2 * required_count),
                 measures=measures,
             )
     return pass_with(
-        f"The robot went out and came back {_format_times(wanted)}, {abs(float(ahead[outs[0].row])):.0f} mm the "
+        f"The robot went out and came back {_format_times(required_count)}, "
+        f"{abs(float(forward_distances[peaks[0].row])):.0f} mm the "
         "first time, "
-        f"and ended {format_number(float(away[-1]))} mm from its start.",
+        f"and ended {format_number(float(start_distances[-1]))} mm from its start.",
         recording.end_t,
         recording.end,
         measures,
@@ -188,34 +203,35 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     """Judge the robot's reaction in the seconds after each fall of the reading below the threshold."""
     recording = trial.recording
     falls = _find_falls(criterion, recording)
-    answered = _find_answered_falls(criterion, recording, falls)
-    measures = (Measure("encounters", len(falls)), Measure("answered", len(answered)))
-    score = Fraction(min(len(answered), criterion.at_least), criterion.at_least)
-    if len(answered) >= criterion.at_least:
+    answered_falls = _find_answered_falls(criterion, recording, falls)
+    measures = (Measure("encounters", len(falls)), Measure("answered", len(answered_falls)))
+    score = Fraction(min(len(answered_falls), criterion.at_least), criterion.at_least)
+    if len(answered_falls) >= criterion.at_least:
         return pass_with(
             f"The robot saw something dark {_format_times(len(falls))}, and reacted as expected "
-            f"{_format_times(len(answered))}.",
-            *find_place(recording, answered[-1]),
+            f"{_format_times(len(answered_falls))}.",
+            *find_place(recording, answered_falls[-1]),
             measures,
         )
-    what = " and then ".join(criterion.then)
-    expected = f"Expected the robot to {what} {_format_times(criterion.at_least)} after seeing something dark"
-    ignored = min(set(falls).difference(answered), default=None)
-    if ignored is not None:
+    reactions = " and then ".join(criterion.then)
+    expected = f"Expected the robot to {reactions} {_format_times(criterion.at_least)} after seeing something dark"
+    ignored_fall = min(set(falls).difference(answered_falls), default=None)
+    if ignored_fall is not None:
         return fail_with(
-            f"{expected}, but it {_describe_repetitions(len(answered))}; this is the first time without a reaction.",
-            *find_place(recording, ignored),
+            f"{expected}, but it {_describe_repetitions(len(answered_falls))}; this is the first time without a "
+            "reaction.",
+            *find_place(recording, ignored_fall),
             score=score,
             measures=measures,
         )
     sensor = "a light sensor" if criterion.light == "either" else f"its {criterion.light} light sensor"
-    fell = (
+    reading_clause = (
         f"fell below {criterion.below:g} % only {_format_times(len(falls))}"
         if falls
         else f"never fell below {criterion.below:g} %"
     )
     return fail_with(
-        f"{expected}, but the reading of {sensor} {fell}.",
+        f"{expected}, but the reading of {sensor} {reading_clause}.",
         recording.end_t,
         recording.end,
         score=score,
@@ -225,94 +241,98 @@ def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _TurningPoint:
-    """A change from going out to coming back (``out``), or the reverse."""
+    """A change from going out to coming back (``is_outward``), or the reverse."""
 
     row: int
     is_outward: bool
 
 
-def _find_turning_points(ahead: Floats) -> list[_TurningPoint]:
+def _find_turning_points(forward_distances: Floats) -> list[_TurningPoint]:
     """Return peaks and returns alternately, beginning with the first way out, ending with the last row.
 
     A change of direction counts from 5 mm on. A last way out without a return ends in a peak.
     """
     turns: list[_TurningPoint] = []
     sign = 0.0  # the side of the current excursion, 0 before the first
-    extreme, going_out = 0, True
-    for row, value in enumerate(ahead):
+    extreme, is_outward = 0, True
+    for row, value in enumerate(forward_distances):
         if not sign:
             if abs(value) >= _MIN_MOTION:
                 sign, extreme = math.copysign(1, value), row
             continue
-        away, best = sign * float(value), sign * float(ahead[extreme])
-        if (away > best) if going_out else (away < best):
+        extent, best_extent = sign * float(value), sign * float(forward_distances[extreme])
+        if (extent > best_extent) if is_outward else (extent < best_extent):
             extreme = row
-        elif abs(away - best) >= _MIN_MOTION:
-            turns.append(_TurningPoint(extreme, going_out))
-            going_out, extreme = not going_out, row
+        elif abs(extent - best_extent) >= _MIN_MOTION:
+            turns.append(_TurningPoint(extreme, is_outward))
+            is_outward, extreme = not is_outward, row
     if sign:
-        turns.append(_TurningPoint(extreme, going_out))
+        turns.append(_TurningPoint(extreme, is_outward))
     return turns
 
 
-def _match_moves(criterion: Moves, made: tuple[Move, ...]) -> list[Move | None]:
+def _match_moves(criterion: Moves, moves: tuple[Move, ...]) -> list[Move | None]:
     """Return the move matched to each required one, with as many matches as possible."""
-    suits = [[describe_mismatch(wanted, move) is None for move in made] for wanted in criterion.moves]
+    matches = [[describe_mismatch(wanted, move) is None for move in moves] for wanted in criterion.moves]
 
-    def first_from(wish: int, start: int) -> int | None:
-        return next((place for place in range(start, len(made)) if suits[wish][place]), None)
+    def find_next_match(wish: int, start: int) -> int | None:
+        return next((place for place in range(start, len(moves)) if matches[wish][place]), None)
 
-    places = match_most_in_order(len(suits), first_from) if criterion.in_order else match_most_pairs(suits)
-    return [None if place is None else made[place] for place in places]
+    places = match_most_in_order(len(matches), find_next_match) if criterion.in_order else match_most_pairs(matches)
+    return [None if place is None else moves[place] for place in places]
 
 
 def _fail_for_missing_move(
     criterion: Moves,
     recording: Recording,
-    made: tuple[Move, ...],
-    found: list[Move | None],
+    moves: tuple[Move, ...],
+    matched_moves: list[Move | None],
     number: int,
     score: Fraction,
     measures: tuple[Measure, ...],
 ) -> Outcome:
     """Return the outcome for a missing move, with the move that was made instead."""
-    wanted = criterion.moves[number]
-    called = f"{wanted.name}: " if wanted.name else ""
-    after = max((made.index(move) for move in found[:number] if move is not None), default=-1) + 1
-    free = [move for move in made[after if criterion.in_order else 0 :] if move not in found]
-    if not free:
-        told = f"did not: in its last move it {made[-1]}" if made else "did not move at all"
+    required_move = criterion.moves[number]
+    name_prefix = f"{required_move.name}: " if required_move.name else ""
+    start = max((moves.index(move) for move in matched_moves[:number] if move is not None), default=-1) + 1
+    free_moves = [move for move in moves[start if criterion.in_order else 0 :] if move not in matched_moves]
+    if not free_moves:
+        behaviour = f"did not: in its last move it {moves[-1]}" if moves else "did not move at all"
         return fail_with(
-            f"Expected {called}{_describe_required_move(wanted)}, but the robot {told}.",
+            f"Expected {name_prefix}{_describe_required_move(required_move)}, but the robot {behaviour}.",
             recording.end_t,
             recording.end,
             score,
             measures,
         )
-    near = min(free, key=lambda move: _count_missed_conditions(wanted, move)) if not criterion.in_order else free[0]
+    closest_move = (
+        min(free_moves, key=lambda move: _count_missed_conditions(required_move, move))
+        if not criterion.in_order
+        else free_moves[0]
+    )
     return fail_with(
-        f"Expected {called}{_describe_required_move(wanted)}, but the robot {near}.",
-        *find_place(recording, near.last),
+        f"Expected {name_prefix}{_describe_required_move(required_move)}, but the robot {closest_move}.",
+        *find_place(recording, closest_move.last),
         score=score,
-        measures=measures or build_move_measures(near, "this move"),
+        measures=measures or build_move_measures(closest_move, "this move"),
     )
 
 
-def _describe_required_move(wanted: NamedMotion) -> str:
-    asked = (
-        ("forwards", "backwards", wanted.forward, " mm"),
-        ("to the left", "to the right", wanted.sideways, " mm"),
-        ("away from where it began", "", wanted.distance, " mm"),
-        ("of turn to the left", "of turn to the right", wanted.turn, "°"),
-        ("of turn", "", wanted.turn_size, "°"),
-        ("long", "", wanted.seconds, " s"),
+def _describe_required_move(required_move: NamedMotion) -> str:
+    conditions = (
+        ("forwards", "backwards", required_move.forward, " mm"),
+        ("to the left", "to the right", required_move.sideways, " mm"),
+        ("away from where it began", "", required_move.distance, " mm"),
+        ("of turn to the left", "of turn to the right", required_move.turn, "°"),
+        ("of turn", "", required_move.turn_size, "°"),
+        ("long", "", required_move.seconds, " s"),
     )
-    words = []
-    for positive, negative, wished, unit in asked:
-        if wished is not None:
-            what, least, most = orient_range(wished, positive, negative)
-            words.append(f"{describe_range(least, most, unit)} {what}")
-    return f"a move of {', '.join(words)}"
+    descriptions = []
+    for positive, negative, bounds, unit in conditions:
+        if bounds is not None:
+            direction, minimum, maximum = orient_range(bounds, positive, negative)
+            descriptions.append(f"{describe_range(minimum, maximum, unit)} {direction}")
+    return f"a move of {', '.join(descriptions)}"
 
 
 def _describe_proportion(heights: tuple[float, ...]) -> str:
@@ -321,18 +341,20 @@ def _describe_proportion(heights: tuple[float, ...]) -> str:
     return f"in the proportion {' to '.join(f'{height:g}' for height in heights)}"
 
 
-def _count_missed_conditions(wanted: NamedMotion, move: Move) -> int:
+def _count_missed_conditions(required_move: NamedMotion, move: Move) -> int:
     """Return how many of the conditions a move misses."""
     parts = ("forward", "sideways", "distance", "turn", "turn_size", "seconds")
-    given = (part for part in parts if getattr(wanted, part) is not None)
-    return sum(describe_mismatch(NamedMotion(**{part: getattr(wanted, part)}), move) is not None for part in given)
+    conditions = (part for part in parts if getattr(required_move, part) is not None)
+    return sum(
+        describe_mismatch(NamedMotion(**{part: getattr(required_move, part)}), move) is not None for part in conditions
+    )
 
 
 def _compute_distance_ahead(recording: Recording) -> Floats:
     """Return the distance ahead of the start, along its heading, mm, shape (n + 1,)."""
-    along = math.radians(recording.start.heading)
-    away = compute_positions(recording) - np.array([recording.start.x, recording.start.y])
-    return np.asarray(away @ np.array([math.cos(along), math.sin(along)]))
+    heading = math.radians(recording.start.heading)
+    offsets = compute_positions(recording) - np.array([recording.start.x, recording.start.y])
+    return np.asarray(offsets @ np.array([math.cos(heading), math.sin(heading)]))
 
 
 def _read_wheel_positions(recording: Recording) -> tuple[float, float]:
@@ -344,20 +366,20 @@ def _find_falls(criterion: Encounters, recording: Recording) -> list[int]:
     """Return the rows at which a sensor's reading fell below the threshold. Readings off the floor don't count."""
     ticks = recording.ticks
     readings = {"left": ticks.left_rgb, "right": ticks.right_rgb}
-    dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
+    is_dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
     for side, rgb in readings.items():
         if criterion.light in (side, "either"):
             x, y = compute_positions(recording, "left_light" if side == "left" else "right_light")[1:].T
-            edge = get_recorded_robot(recording).left_light.diameter / 2
-            on_floor = (x >= edge) & (x <= WIDTH - edge) & (y >= edge) & (y <= HEIGHT - edge)
-            dark |= on_floor & (rgb[:, 0] / 255 * 100 < criterion.below)
-    return [first + 1 for first, _ in find_true_runs(dark)]
+            radius = get_recorded_robot(recording).left_light.diameter / 2
+            is_on_floor = (x >= radius) & (x <= WIDTH - radius) & (y >= radius) & (y <= HEIGHT - radius)
+            is_dark |= is_on_floor & (rgb[:, 0] / 255 * 100 < criterion.below)
+    return [first + 1 for first, _ in find_true_runs(is_dark)]
 
 
 def _find_answered_falls(criterion: Encounters, recording: Recording, falls: list[int]) -> list[int]:
     """Return the falls after which everything required happened in order and in time."""
-    ahead, turned = compute_travel(recording)
-    motion = _Motion(-np.minimum(ahead, 0), turned, compute_still_mask(recording))
+    forward_steps, turns = compute_travel(recording)
+    motion = _Motion(-np.minimum(forward_steps, 0), turns, compute_still_mask(recording))
     t = compute_times(recording)
     ends = np.searchsorted(t, t[falls] + criterion.seconds, side="right") - 1
     return [
@@ -376,19 +398,22 @@ class _Motion:
     still: NDArray[np.bool_]
 
 
-def _has_all_reactions(deeds: tuple[str, ...], motion: _Motion, begin: int, end: int) -> bool:
-    for deed in deeds:
-        since = slice(begin, end)
-        if deed == "reverse":
-            reached = np.cumsum(motion.backwards[since]) >= _REVERSED
-        elif deed == "turn":
-            reached = np.abs(np.cumsum(motion.turned[since])) >= _TURNED
+def _has_all_reactions(reactions: tuple[str, ...], motion: _Motion, start: int, end: int) -> bool:
+    for reaction in reactions:
+        window = slice(start, end)
+        if reaction == "reverse":
+            is_reached = np.cumsum(motion.backwards[window]) >= _REVERSED
+        elif reaction == "turn":
+            is_reached = np.abs(np.cumsum(motion.turned[window])) >= _TURNED
         else:
-            stood = np.cumsum(motion.still[since])
-            reached = stood - np.concatenate([np.zeros(_STOPPED, dtype=int), stood])[: len(stood)] >= _STOPPED
-        if not reached.any():
+            still_counts = np.cumsum(motion.still[window])
+            is_reached = (
+                still_counts - np.concatenate([np.zeros(_STOPPED, dtype=int), still_counts])[: len(still_counts)]
+                >= _STOPPED
+            )
+        if not is_reached.any():
             return False
-        begin += int(np.argmax(reached)) + 1
+        start += int(np.argmax(is_reached)) + 1
     return True
 
 
@@ -404,5 +429,5 @@ def _format_ordinal(number: int) -> str:
     return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
 
 
-def _format_count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+def _format_count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -51,15 +51,15 @@ class Move:
         return math.hypot(self.forward, self.sideways)
 
     def __str__(self) -> str:
-        words = []
+        clauses = []
         if abs(self.turn) >= 2:
-            words.append(f"turned {abs(self.turn):.1f}° {'left' if self.turn > 0 else 'right'}")
-        if self.distance >= 5 or not words:
-            way = "forwards" if self.forward >= 0 else "backwards"
-            words.append(f"went {abs(self.forward):.0f} mm {way}")
+            clauses.append(f"turned {abs(self.turn):.1f}° {'left' if self.turn > 0 else 'right'}")
+        if self.distance >= 5 or not clauses:
+            direction = "forwards" if self.forward >= 0 else "backwards"
+            clauses.append(f"went {abs(self.forward):.0f} mm {direction}")
         if abs(self.sideways) >= 5:
-            words.append(f"{abs(self.sideways):.0f} mm to its {'left' if self.sideways > 0 else 'right'}")
-        return f"{' and '.join(words)} in {self.seconds:.2f} s"
+            clauses.append(f"{abs(self.sideways):.0f} mm to its {'left' if self.sideways > 0 else 'right'}")
+        return f"{' and '.join(clauses)} in {self.seconds:.2f} s"
 
 
 def split_moves(recording: Recording) -> tuple[Move, ...]:
@@ -68,67 +68,69 @@ def split_moves(recording: Recording) -> tuple[Move, ...]:
     Moves are separated by standing still for more than two ticks. They are also separated by a change between driving
     forwards, backwards, turning left and turning right, if both last 0.3 s.
     """
-    ways = _classify_ticks(recording)
+    kinds = _classify_ticks(recording)
     return tuple(
         build_move(recording, first, last)
-        for begin, end in _split_at_rests(ways == 0)
-        for first, last in _split_by_motion(ways, begin, end)
+        for begin, end in _split_at_rests(kinds == 0)
+        for first, last in _split_by_motion(kinds, begin, end)
     )
 
 
 def build_move(recording: Recording, first: int, last: int) -> Move:
     """Return the move made by the ticks after row ``first`` up to row ``last``."""
-    _, before = find_place(recording, first)
-    _, after = find_place(recording, last)
-    ahead, left = to_relative_position(before, after.x, after.y)
-    return Move(first, last, ahead, left, after.heading - before.heading, tick_to_seconds(recording, last - first))
+    _, start_pose = find_place(recording, first)
+    _, end_pose = find_place(recording, last)
+    forward, sideways = to_relative_position(start_pose, end_pose.x, end_pose.y)
+    return Move(
+        first, last, forward, sideways, end_pose.heading - start_pose.heading, tick_to_seconds(recording, last - first)
+    )
 
 
 def compute_straight_mask(recording: Recording) -> NDArray[np.bool_]:
     """Return whether both wheels moved almost equally in each tick, shape (n,); false while the robot stands still."""
-    ahead, turned = compute_travel(recording)
-    between_wheels = np.radians(turned) * get_recorded_robot(recording).wheel_spacing
-    return (np.abs(between_wheels) <= _STRAIGHT * np.abs(ahead)) & ~compute_still_mask(recording)
+    forward_steps, turns = compute_travel(recording)
+    between_wheels = np.radians(turns) * get_recorded_robot(recording).wheel_spacing
+    return (np.abs(between_wheels) <= _STRAIGHT * np.abs(forward_steps)) & ~compute_still_mask(recording)
 
 
 def _classify_ticks(recording: Recording) -> NDArray[np.int8]:
     """Return the kind of motion in each tick, shape (n,): forwards 1, backwards -1, left 2, right -2, rest 0."""
-    ahead, turned = compute_travel(recording)
-    ways = np.where(compute_straight_mask(recording), np.sign(ahead), 2 * np.sign(turned))
-    return np.where(compute_still_mask(recording), 0, ways).astype(np.int8)
+    forward_steps, turns = compute_travel(recording)
+    kinds = np.where(compute_straight_mask(recording), np.sign(forward_steps), 2 * np.sign(turns))
+    return np.where(compute_still_mask(recording), 0, kinds).astype(np.int8)
 
 
-def describe_mismatch(wanted: MotionConditions, move: Move) -> str | None:
+def describe_mismatch(required: MotionConditions, move: Move) -> str | None:
     """Return how a move differs from the required one, ``a turn of 85 to 95°, but it was 80°``; None if it matches."""
-    asked = (
-        ("a distance from where it began", "", "", wanted.distance, move.distance, " mm"),
-        ("a distance", " forwards", " backwards", wanted.forward, move.forward, " mm"),
-        ("a distance", " to the left", " to the right", wanted.sideways, move.sideways, " mm"),
-        ("a turn", " to the left", " to the right", wanted.turn, move.turn, "°"),
-        ("a turn", "", "", wanted.turn_size, abs(move.turn), "°"),
-        ("a time", "", "", wanted.seconds, move.seconds, " s"),
+    conditions = (
+        ("a distance from where it began", "", "", required.distance, move.distance, " mm"),
+        ("a distance", " forwards", " backwards", required.forward, move.forward, " mm"),
+        ("a distance", " to the left", " to the right", required.sideways, move.sideways, " mm"),
+        ("a turn", " to the left", " to the right", required.turn, move.turn, "°"),
+        ("a turn", "", "", required.turn_size, abs(move.turn), "°"),
+        ("a time", "", "", required.seconds, move.seconds, " s"),
     )
-    for what, positive, negative, wished, value, unit in asked:
-        if wished is None or wished[0] <= value <= wished[1]:
+    for noun, positive, negative, bounds, value, unit in conditions:
+        if bounds is None or bounds[0] <= value <= bounds[1]:
             continue
-        side, least, most = orient_range(wished, positive, negative)
-        found = format_number(abs(value))
-        way = "" if found == "0" else negative if value < 0 else positive
-        return f"{what}{side} of {describe_range(least, most, unit)}, but it was {found}{unit}{way}"
+        side, minimum, maximum = orient_range(bounds, positive, negative)
+        actual = format_number(abs(value))
+        direction = "" if actual == "0" else negative if value < 0 else positive
+        return f"{noun}{side} of {describe_range(minimum, maximum, unit)}, but it was {actual}{unit}{direction}"
     return None
 
 
-def orient_range(wished: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
+def orient_range(bounds: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
     """Return a negative range as a positive one, with the word for its side."""
-    least, most = wished
-    return (negative, -most, -least) if most <= 0 and least < 0 else (positive, least, most)
+    minimum, maximum = bounds
+    return (negative, -maximum, -minimum) if maximum <= 0 and minimum < 0 else (positive, minimum, maximum)
 
 
-def describe_range(least: float, most: float, unit: str) -> str:
+def describe_range(minimum: float, maximum: float, unit: str) -> str:
     """Return a range as ``85 to 95°``, ``at least 100 mm`` or ``1 s``."""
-    if most >= _NO_BOUND:
-        return f"at least {least:g}{unit}"
-    return f"{least:g}{unit}" if least == most else f"{least:g} to {most:g}{unit}"
+    if maximum >= _NO_BOUND:
+        return f"at least {minimum:g}{unit}"
+    return f"{minimum:g}{unit}" if minimum == maximum else f"{minimum:g} to {maximum:g}{unit}"
 
 
 def format_number(value: float) -> str:
@@ -147,24 +149,24 @@ def build_move_measures(move: Move, name: str) -> tuple[Measure, ...]:
     )
 
 
-def _split_at_rests(still: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    resting = np.zeros_like(still)
-    for first, last in find_true_runs(still):
-        if last - first > _REST or first == 0 or last == len(still):
-            resting[first:last] = True
-    return find_true_runs(~resting)
+def _split_at_rests(is_still: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    is_resting = np.zeros_like(is_still)
+    for first, last in find_true_runs(is_still):
+        if last - first > _REST or first == 0 or last == len(is_still):
+            is_resting[first:last] = True
+    return find_true_runs(~is_resting)
 
 
-def _split_by_motion(ways: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
+def _split_by_motion(kinds: NDArray[np.int8], first: int, last: int) -> list[tuple[int, int]]:
     """Split a range of ticks where two lasting kinds of motion meet."""
-    lasting = sorted(
+    lasting_runs = sorted(
         (begin, end, way)
         for way in (-2, -1, 1, 2)
-        for begin, end in find_true_runs(ways[first:last] == way)
+        for begin, end in find_true_runs(kinds[first:last] == way)
         if end - begin >= _LASTING
     )
     cuts = [first]
-    for (_, end, way), (_, _, following) in itertools.pairwise(lasting):
-        if way != following:
+    for (_, end, kind), (_, _, next_kind) in itertools.pairwise(lasting_runs):
+        if kind != next_kind:
             cuts.append(first + end)
     return list(zip(cuts, [*cuts[1:], last], strict=True))

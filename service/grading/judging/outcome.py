@@ -73,21 +73,21 @@ def find_ending_fault(recording: Recording) -> Fault | None:
 
 def compute_marks(marks: Decimal, share: Fraction) -> Decimal:
     """Return ``share`` (0 to 1) of ``marks``, rounded half up to two places, at most ``marks``."""
-    exact = Fraction(marks) * min(max(share, Fraction(0)), Fraction(1))
+    exact_marks = Fraction(marks) * min(max(share, Fraction(0)), Fraction(1))
     # Scaled to whole cents first, so that no decimal expansion is truncated before rounding.
-    cents = exact * 100
-    whole = (2 * cents.numerator + cents.denominator) // (2 * cents.denominator)
-    return min(Decimal(whole).scaleb(-2), marks).quantize(_CENT, rounding=ROUND_HALF_UP)
+    cents = exact_marks * 100
+    whole_cents = (2 * cents.numerator + cents.denominator) // (2 * cents.denominator)
+    return min(Decimal(whole_cents).scaleb(-2), marks).quantize(_CENT, rounding=ROUND_HALF_UP)
 
 
-def combine_outcomes(outcomes: Sequence[Outcome], over: Over) -> Fraction:
-    """Return the fraction of a criterion's marks for these trials, by the rule ``over``; 0 without trials."""
+def combine_outcomes(outcomes: Sequence[Outcome], rule: Over) -> Fraction:
+    """Return the fraction of a criterion's marks for these trials, by the rule ``rule``; 0 without trials."""
     if not outcomes:
         return Fraction(0)
     passes = sum(outcome.passed for outcome in outcomes)
     scores = sorted(outcome.score for outcome in outcomes)
     count = len(scores)
-    match over:
+    match rule:
         case "share":
             return Fraction(passes, count)
         case "all":
@@ -110,27 +110,29 @@ def round_to_steps(share: Fraction) -> Fraction:
     return min(Fraction((2 * share * _STEPS + 1) // 2, _STEPS), Fraction(_STEPS - 1, _STEPS))
 
 
-def compute_accuracy_share(right: int, count: int, at_least: float | None, over: Over) -> Fraction:
-    """Return the fraction of a classification's marks for ``right`` of ``count`` answers.
+def compute_accuracy_share(correct_count: int, count: int, at_least: float | None, rule: Over) -> Fraction:
+    """Return the fraction of a classification's marks for ``correct_count`` of ``count`` answers.
 
     Full marks from ``at_least`` on (all correct if None). Below it, nothing with ``all``, otherwise in proportion.
     """
     if not count:
         return Fraction(0)
-    accuracy = Fraction(right, count)
+    accuracy = Fraction(correct_count, count)
     # Convert the decimal that the instructor wrote, not its nearest binary fraction: 9 of 10 is at least 0.9.
-    enough = Fraction(1) if at_least is None else Fraction(str(at_least))
-    if accuracy >= enough:
+    required_accuracy = Fraction(1) if at_least is None else Fraction(str(at_least))
+    if accuracy >= required_accuracy:
         return Fraction(1)
-    return Fraction(0) if over == "all" else accuracy / enough
+    return Fraction(0) if rule == "all" else accuracy / required_accuracy
 
 
-def compute_steps_share(right: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal) -> Fraction:
+def compute_steps_share(
+    correct_count: int, count: int, steps: Sequence[tuple[float, float]], marks: Decimal
+) -> Fraction:
     """Return the fraction of ``marks`` for the last step that the accuracy reaches.
 
-    ``steps`` are pairs (accuracy, marks). The accuracy is ``right`` of ``count``.
+    ``steps`` are pairs (accuracy, marks). The accuracy is ``correct_count`` of ``count``.
     """
     if not count or not marks:
         return Fraction(0)
-    reached = [worth for accuracy, worth in steps if Fraction(right, count) >= Fraction(str(accuracy))]
-    return Fraction(str(reached[-1])) / Fraction(marks) if reached else Fraction(0)
+    reached_marks = [worth for accuracy, worth in steps if Fraction(correct_count, count) >= Fraction(str(accuracy))]
+    return Fraction(str(reached_marks[-1])) / Fraction(marks) if reached_marks else Fraction(0)

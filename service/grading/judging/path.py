@@ -44,50 +44,56 @@ def judge_visits(criterion: Visits, trial: TrialResult) -> Outcome:
     """Judge the places in order (or at any time). A place is visited when its edge is reached."""
     recording = trial.recording
     points = compute_positions(recording, criterion.of)
-    visited = _find_visited_rows(criterion, points)
-    rows = [row for row in visited if row is not None]
-    missed = next((place for place, row in zip(criterion.places, visited, strict=True) if row is None), None)
-    reached = len(rows)
-    measures = (Measure("places visited", reached),)
-    enough = criterion.at_least or len(criterion.places)
-    score = Fraction(min(reached, enough), enough)
-    who = PART_NAMES[criterion.of]
-    if missed is not None and reached < enough:
-        near = _find_nearest(measure_area_distance(missed, points))
-        then = ", after the places before it," if criterion.in_order and criterion.places[0] is not missed else ""
-        told = f"its smallest distance was {near[1]:.0f} mm" if near and near[1] > 0 else "it did not get there"
+    visited_rows = _find_visited_rows(criterion, points)
+    rows = [row for row in visited_rows if row is not None]
+    missed_area = next((place for place, row in zip(criterion.places, visited_rows, strict=True) if row is None), None)
+    visited_count = len(rows)
+    measures = (Measure("places visited", visited_count),)
+    required_count = criterion.at_least or len(criterion.places)
+    score = Fraction(min(visited_count, required_count), required_count)
+    part_name = PART_NAMES[criterion.of]
+    if missed_area is not None and visited_count < required_count:
+        nearest = _find_nearest(measure_area_distance(missed_area, points))
+        order_clause = (
+            ", after the places before it," if criterion.in_order and criterion.places[0] is not missed_area else ""
+        )
+        behaviour = (
+            f"its smallest distance was {nearest[1]:.0f} mm" if nearest and nearest[1] > 0 else "it did not get there"
+        )
         return fail_with(
-            f"Expected {who} to reach{then} {missed}, but {told} "
-            f"({reached} of {len(criterion.places)} places visited).",
-            *find_place(recording, near[0] if near else len(points) - 1),
+            f"Expected {part_name} to reach{order_clause} {missed_area}, but {behaviour} "
+            f"({visited_count} of {len(criterion.places)} places visited).",
+            *find_place(recording, nearest[0] if nearest else len(points) - 1),
             score=score,
             measures=measures,
         )
     stops = [(place, row) for place in criterion.places if (row := _find_stop(recording, place, points)) is not None]
     if criterion.without_stopping and stops:
-        place, row = stops[0]
+        stop_area, row = stops[0]
         return fail_with(
-            f"Expected {who} not to stop in {place}, but it stopped there.",
+            f"Expected {part_name} not to stop in {stop_area}, but it stopped there.",
             *find_place(recording, row),
-            score=Fraction(max(min(reached, enough) - len(stops), 0), enough),
+            score=Fraction(max(min(visited_count, required_count) - len(stops), 0), required_count),
             measures=measures,
         )
-    places = str(criterion.places[0]) if len(criterion.places) == 1 else f"{reached} of {len(criterion.places)} places"
-    return pass_with(f"{_capitalise(who)} reached {places}.", *find_place(recording, max(rows)), measures)
+    places = (
+        str(criterion.places[0]) if len(criterion.places) == 1 else f"{visited_count} of {len(criterion.places)} places"
+    )
+    return pass_with(f"{_capitalise(part_name)} reached {places}.", *find_place(recording, max(rows)), measures)
 
 
 def _find_visited_rows(criterion: Visits, points: Floats) -> list[int | None]:
     """Return the row at which each place is visited, None if it is not; with ``in_order`` as many as possible."""
-    inside = [np.flatnonzero(measure_area_distance(place, points) <= 0) for place in criterion.places]
+    inside_rows = [np.flatnonzero(measure_area_distance(place, points) <= 0) for place in criterion.places]
 
-    def first_from(place: int, row: int) -> int | None:
-        number = int(np.searchsorted(inside[place], row))
-        return int(inside[place][number]) if number < len(inside[place]) else None
+    def find_next_row(index: int, row: int) -> int | None:
+        number = int(np.searchsorted(inside_rows[index], row))
+        return int(inside_rows[index][number]) if number < len(inside_rows[index]) else None
 
     if criterion.in_order:
         # Places may overlap, so one row may be in several.
-        return match_most_in_order(len(inside), first_from, step=0)
-    return [first_from(place, 0) for place in range(len(inside))]
+        return match_most_in_order(len(inside_rows), find_next_row, step=0)
+    return [find_next_row(place, 0) for place in range(len(inside_rows))]
 
 
 @declare_judge(StaysInside)
@@ -98,17 +104,18 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
     if points is None:
         return _fail_for_missing_pen(recording)
     depth = np.min([measure_area_distance(area, points) for area in criterion.areas], axis=0)
-    who, where = PART_NAMES[criterion.of], _describe_areas(criterion.areas)
+    part_name, area_text = PART_NAMES[criterion.of], _describe_areas(criterion.areas)
     measures = (
         *_measure_bounds(points),
         Measure("farthest out", float(np.nanmax(depth)), "mm"),
     )
-    outside = np.flatnonzero(~(depth <= 0) & ~np.isnan(points[:, 0]))
-    if len(outside):
-        row = int(outside[0])
+    outside_rows = np.flatnonzero(~(depth <= 0) & ~np.isnan(points[:, 0]))
+    if len(outside_rows):
+        row = int(outside_rows[0])
         share = Fraction(row, len(points))
         return fail_with(
-            f"Expected {who} to stay in {where}, but it left it at ({points[row, 0]:.0f}, {points[row, 1]:.0f}) "
+            f"Expected {part_name} to stay in {area_text}, but it left it at ({points[row, 0]:.0f}, "
+            f"{points[row, 1]:.0f}) "
             f"and was up to {np.nanmax(depth):.0f} mm outside.",
             *find_place(recording, row),
             score=share,
@@ -116,7 +123,7 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
         )
     if _measure_driven_distance(recording) < criterion.drives:
         return _fail_for_short_drive(recording, criterion.drives, measures)
-    return pass_with(f"{_capitalise(who)} stayed in {where}.", recording.end_t, recording.end, measures)
+    return pass_with(f"{_capitalise(part_name)} stayed in {area_text}.", recording.end_t, recording.end, measures)
 
 
 @declare_judge(KeepsOut)
@@ -126,28 +133,28 @@ def judge_keeps_out(criterion: KeepsOut, trial: TrialResult) -> Outcome:
     points = _find_positions(recording, criterion.of)
     if points is None:
         return _fail_for_missing_pen(recording)
-    who = PART_NAMES[criterion.of]
+    part_name = PART_NAMES[criterion.of]
     distances = np.array([measure_area_distance(area, points) for area in criterion.areas])
     measures = (Measure("least clearance", float(np.nanmin(distances)), "mm"), *_measure_bounds(points))
-    within = (distances <= 0) | (distances < criterion.clear_of)
-    if within.any():
-        row = int(np.flatnonzero(within.any(axis=0))[0])
-        number = int(np.flatnonzero(within[:, row])[0])
-        nearest = float(np.nanmin(distances[number]))
-        keep = f"keep {criterion.clear_of:g} mm from" if criterion.clear_of else "stay out of"
-        where = f"at ({points[row, 0]:.0f}, {points[row, 1]:.0f})"
-        told = f"it entered it {where}"
+    is_too_near = (distances <= 0) | (distances < criterion.clear_of)
+    if is_too_near.any():
+        row = int(np.flatnonzero(is_too_near.any(axis=0))[0])
+        number = int(np.flatnonzero(is_too_near[:, row])[0])
+        min_distance = float(np.nanmin(distances[number]))
+        requirement = f"keep {criterion.clear_of:g} mm from" if criterion.clear_of else "stay out of"
+        position_text = f"at ({points[row, 0]:.0f}, {points[row, 1]:.0f})"
+        behaviour = f"it entered it {position_text}"
         if criterion.clear_of:
-            told = f"it came too near {where}; its smallest distance was {max(nearest, 0):.0f} mm"
+            behaviour = f"it came too near {position_text}; its smallest distance was {max(min_distance, 0):.0f} mm"
         return fail_with(
-            f"Expected {who} to {keep} {criterion.areas[number]}, but {told}.",
+            f"Expected {part_name} to {requirement} {criterion.areas[number]}, but {behaviour}.",
             *find_place(recording, row),
             measures=measures,
         )
     if _measure_driven_distance(recording) < criterion.drives:
         return _fail_for_short_drive(recording, criterion.drives, measures)
     return pass_with(
-        f"{_capitalise(who)} stayed out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
+        f"{_capitalise(part_name)} stayed out of {'them all' if len(criterion.areas) > 1 else criterion.areas[0]}, "
         f"by {np.nanmin(distances):.0f} mm or more.",
         recording.end_t,
         recording.end,
@@ -163,9 +170,9 @@ def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outc
     measures = (Measure("touches", len(touches)),)
     if len(touches) > criterion.at_most:
         touch = touches[criterion.at_most]
-        allowed = f"at most {criterion.at_most} times" if criterion.at_most else "nothing"
+        limit_text = f"at most {criterion.at_most} times" if criterion.at_most else "nothing"
         return fail_with(
-            f"Expected the robot to touch {allowed}, but it touched {touch.what}.",
+            f"Expected the robot to touch {limit_text}, but it touched {touch.what}.",
             touch.t,
             touch.pose,
             measures=measures,
@@ -174,14 +181,14 @@ def judge_touches_nothing(criterion: TouchesNothing, trial: TrialResult) -> Outc
                   recording.end_t, recording.end, measures)  # fmt: skip
 
 
-def _find_stop(recording: Recording, place: Area, points: Floats) -> int | None:
+def _find_stop(recording: Recording, area: Area, points: Floats) -> int | None:
     """Return the row at which the robot had stopped in a place, or None."""
-    inside = measure_area_distance(place, points)[1:] <= 0
-    resting = compute_still_mask(recording) & inside
-    for first, last in find_true_runs(resting):
+    is_inside = measure_area_distance(area, points)[1:] <= 0
+    is_resting = compute_still_mask(recording) & is_inside
+    for first, last in find_true_runs(is_resting):
         if last - first > _STOP:
             return first + 1
-    return len(points) - 1 if len(inside) and inside[-1] else None
+    return len(points) - 1 if len(is_inside) and is_inside[-1] else None
 
 
 def _find_positions(recording: Recording, part: Part) -> Floats | None:
@@ -195,13 +202,13 @@ def _measure_driven_distance(recording: Recording) -> float:
     return float(np.hypot(*np.diff(compute_positions(recording), axis=0).T).sum())
 
 
-def _fail_for_short_drive(recording: Recording, least: float, measures: tuple[Measure, ...]) -> Outcome:
+def _fail_for_short_drive(recording: Recording, min_distance: float, measures: tuple[Measure, ...]) -> Outcome:
     return fail_with(
-        f"Expected the robot to drive {least:g} mm or more, but it drove only "
+        f"Expected the robot to drive {min_distance:g} mm or more, but it drove only "
         f"{_measure_driven_distance(recording):.0f} mm.",
         recording.end_t,
         recording.end,
-        score=Fraction(min(_measure_driven_distance(recording) / least, 1.0)).limit_denominator(1000),
+        score=Fraction(min(_measure_driven_distance(recording) / min_distance, 1.0)).limit_denominator(1000),
         measures=measures,
     )
 
@@ -232,5 +239,5 @@ def _describe_areas(areas: tuple[Area, ...]) -> str:
     return str(areas[0]) if len(areas) == 1 else f"one of {len(areas)} areas"
 
 
-def _capitalise(words: str) -> str:
-    return words[:1].upper() + words[1:]
+def _capitalise(text: str) -> str:
+    return text[:1].upper() + text[1:]

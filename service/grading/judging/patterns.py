@@ -38,18 +38,18 @@ class Sample:
 
 
 def group_by_pattern(
-    images: Sequence[Sample], recording: Recording, how: CombinationRule, apart: float, side: Side = "left"
+    images: Sequence[Sample], recording: Recording, rule: CombinationRule, radius: float, side: Side = "left"
 ) -> list[Sample]:
     """Return one sample per pattern of a trial's ``images``, in the order in which the robot reached them.
 
-    Images with the same truth belong to one pattern if the sensor of that ``side`` was within ``apart`` mm of its
+    Images with the same truth belong to one pattern if the sensor of that ``side`` was within ``radius`` mm of its
     position at the first of them.
     """
-    groups = _PatternGroups(apart)
+    groups = _PatternGroups(radius)
     for image in images:
         if image.image is not None:
             groups.add(image, locate_part(recording, side, image.image.pose))
-    return [_combine_group(group, how) for group in groups.found]
+    return [_combine_group(group, rule) for group in groups.found]
 
 
 @dataclass(slots=True)
@@ -60,28 +60,28 @@ class _PatternGroups:
     found: list[list[Sample]] = field(default_factory=list)
     _near: dict[tuple[str, int, int], list[tuple[int, _Place]]] = field(default_factory=dict)
 
-    def add(self, image: Sample, place: _Place) -> None:
-        own = (image.truth, *self._find_square(place))
-        numbers = [number for number, first in self._find_neighbours(own) if math.dist(first, place) <= self.apart]
+    def add(self, image: Sample, position: _Place) -> None:
+        key = (image.truth, *self._find_square(position))
+        numbers = [number for number, first in self._find_neighbours(key) if math.dist(first, position) <= self.apart]
         if numbers:
             self.found[min(numbers)].append(image)
         else:
-            self._near.setdefault(own, []).append((len(self.found), place))
+            self._near.setdefault(key, []).append((len(self.found), position))
             self.found.append([image])
 
-    def _find_square(self, place: _Place) -> tuple[int, int]:
-        return math.floor(place[0] / self.apart), math.floor(place[1] / self.apart)
+    def _find_square(self, position: _Place) -> tuple[int, int]:
+        return math.floor(position[0] / self.apart), math.floor(position[1] / self.apart)
 
     def _find_neighbours(self, square: tuple[str, int, int]) -> Iterable[tuple[int, _Place]]:
         truth, column, row = square
-        for right, up in product((-1, 0, 1), repeat=2):
-            yield from self._near.get((truth, column + right, row + up), ())
+        for column_step, row_step in product((-1, 0, 1), repeat=2):
+            yield from self._near.get((truth, column + column_step, row + row_step), ())
 
 
-def _combine_group(group: Sequence[Sample], how: CombinationRule) -> Sample:
+def _combine_group(group: Sequence[Sample], rule: CombinationRule) -> Sample:
     if len(group) == 1:
         return group[0]
-    match how:
+    match rule:
         case "first":
             return group[0]
         case "any":
@@ -95,10 +95,12 @@ def _choose_majority(group: Sequence[Sample]) -> Sample:
     counts = Counter(sample.answer for sample in group if sample.answer is not None).most_common()
     if not counts:
         return group[0]
-    most = counts[0][1]
-    leaders = tuple(str(answer) for answer, count in counts if count == most)
+    top_count = counts[0][1]
+    leaders = tuple(str(answer) for answer, count in counts if count == top_count)
     if len(leaders) > 1:
-        words = f"{quote_list(leaders)} were answered equally often for its {len(group)} images"
-        return replace(group[0], answer=None, words=words)
-    chosen = next(sample for sample in group if sample.answer == leaders[0])
-    return replace(chosen, words=f"it was identified as {quote_list(leaders)} {most} times in {len(group)} images")
+        description = f"{quote_list(leaders)} were answered equally often for its {len(group)} images"
+        return replace(group[0], answer=None, words=description)
+    majority_sample = next(sample for sample in group if sample.answer == leaders[0])
+    return replace(
+        majority_sample, words=f"it was identified as {quote_list(leaders)} {top_count} times in {len(group)} images"
+    )

@@ -60,40 +60,42 @@ def find_reply(recording: Recording, answers: Answers, number: int) -> Reply:
     answer does not count. Of several answers, the first that arrived in time counts.
     """
     image = recording.images[number]
-    following = recording.images[number + 1].t if number + 1 < len(recording.images) else None
-    came = answers.list_answers(image.message)
-    statuses = [(_determine_status(message, following), message) for message in came]
-    arrived = [pair for pair in statuses if pair[0] != "unanswered"]
-    if not arrived:
-        return _build_missing_reply(recording, answers, image.message, came)
-    status, message = min(arrived, key=_rank_answer)
+    next_image_time = recording.images[number + 1].t if number + 1 < len(recording.images) else None
+    received_answers = answers.list_answers(image.message)
+    statuses = [(_determine_status(message, next_image_time), message) for message in received_answers]
+    arrived_answers = [pair for pair in statuses if pair[0] != "unanswered"]
+    if not arrived_answers:
+        return _build_missing_reply(recording, answers, image.message, received_answers)
+    status, message = min(arrived_answers, key=_rank_answer)
     text = message.text
-    duplicates = len(arrived) - 1
+    duplicates = len(arrived_answers) - 1
     if status == "malformed":
         return Reply(status, None, "the answer begins with JSON:: but is not JSON", duplicates)
     return Reply(status, text, "", duplicates)
 
 
-def _rank_answer(arrived: tuple[ReplyStatus, Message]) -> tuple[int, float]:
+def _rank_answer(answer: tuple[ReplyStatus, Message]) -> tuple[int, float]:
     """Return the sort key of answers: by status, then by arrival. Answers in transit at the end come last."""
-    status, message = arrived
+    status, message = answer
     return _STATUS_ORDER.index(status), math.inf if message.delivered is None else message.delivered
 
 
-def _determine_status(message: Message, following: float | None) -> ReplyStatus:
+def _determine_status(message: Message, next_image_time: float | None) -> ReplyStatus:
     if message.note == "malformed":
         return "malformed"
     if message.delivered is None:
         return "unanswered" if message.note == "lost" else "late"
-    return "late" if following is not None and message.delivered > following else "answered"
+    return "late" if next_image_time is not None and message.delivered > next_image_time else "answered"
 
 
-def _build_missing_reply(recording: Recording, answers: Answers, question: int, came: Sequence[Message]) -> Reply:
+def _build_missing_reply(
+    recording: Recording, answers: Answers, question: int, received_answers: Sequence[Message]
+) -> Reply:
     """Return the reply if nothing arrived: image or answer was lost, the answer was not a text, or none was given."""
-    if came:
+    if received_answers:
         return Reply("unanswered", None, "the answer was lost on its way")
-    sent = recording.messages[question] if question < len(recording.messages) else None
-    if sent is not None and sent.note == "lost":
+    question_message = recording.messages[question] if question < len(recording.messages) else None
+    if question_message is not None and question_message.note == "lost":
         return Reply("unanswered", None, "the image was lost on its way")
     fault = answers.find_fault_after(question)
     if fault is not None and is_wrong_return(fault):
@@ -122,8 +124,8 @@ class ClassificationResult:
 
 def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTrials) -> ClassificationResult:
     """Classify every image of ``trials`` (with their indices in the grade) that counts, over all trials."""
-    shown = find_counted_images(criterion, trials)
-    truths = [truth for told_truths in shown.values() for _, truth in told_truths]
+    truths_by_trial = find_counted_images(criterion, trials)
+    truths = [truth for told_truths in truths_by_trial.values() for _, truth in told_truths]
     labels = collect_labels(criterion, assignment, truths)
     finder = LabelFinder(labels, criterion.aliases)
     images: list[Sample] = []
@@ -135,13 +137,13 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         replies = _collect_replies(criterion, recording)
         statuses.update(reply.status for reply in replies)
         duplicates += sum(reply.duplicates for reply in replies)
-        own = []
-        for number, truth in shown[index]:
-            answer, words, confidence = _read_answer(criterion, replies[number], finder)
+        trial_images = []
+        for number, truth in truths_by_trial[index]:
+            answer, description, confidence = _read_answer(criterion, replies[number], finder)
             image = recording.images[number]
-            own.append(Sample(index, image, finder.to_canonical(truth), answer, words, confidence))
-        images += own
-        samples += _collect_counted_samples(criterion, index, trial, own, finder)
+            trial_images.append(Sample(index, image, finder.to_canonical(truth), answer, description, confidence))
+        images += trial_images
+        samples += _collect_counted_samples(criterion, index, trial, trial_images, finder)
     by_index = dict(trials)
     of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
     for sample in samples:
@@ -151,7 +153,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         for sample in images
         if sample.image is not None
     )
-    missing = sum(sample.image is None for sample in samples)
+    missing_count = sum(sample.image is None for sample in samples)
     counts = Counts(
         sum(statuses.values()),
         statuses["answered"],
@@ -159,8 +161,8 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         statuses["malformed"],
         statuses["unanswered"],
         duplicates,
-        len(samples) - missing,
-        missing,
+        len(samples) - missing_count,
+        missing_count,
         "images" if criterion.each_pattern is None else "patterns",
     )
     return ClassificationResult(
@@ -171,37 +173,42 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
     )
 
 
-def judge_pooled(trials: IndexedTrials, judged: Callable[[IndexedTrials], CriterionResult]) -> CriterionResult:
+def judge_pooled(trials: IndexedTrials, judge_trials: Callable[[IndexedTrials], CriterionResult]) -> CriterionResult:
     """Return the result over all trials. If some are hidden, also the feedback from the visible ones alone."""
-    result = judged(trials)
+    result = judge_trials(trials)
     visible = [(index, trial) for index, trial in trials if trial.visibility == "visible"]
     if len(visible) == len(trials):
         return result
     if not visible:
         return replace(result, shown=VisibleFeedback(add_hidden_note("")))
-    alone = judged(visible)
-    return replace(result, shown=VisibleFeedback(add_hidden_note(alone.message), alone.accuracy, alone.curves))
+    visible_result = judge_trials(visible)
+    return replace(
+        result,
+        shown=VisibleFeedback(add_hidden_note(visible_result.message), visible_result.accuracy, visible_result.curves),
+    )
 
 
 def build_recognition_result(
     criterion: Recognition,
-    found: ClassificationResult,
+    classification: ClassificationResult,
     share: Fraction,
-    words: str,
+    reason: str,
     curves: tuple[AccuracyCurve, ...],
     trials: Mapping[int, TrialResult],
 ) -> CriterionResult:
-    """Return the result for ``share`` of the marks. ``words`` gives the reason, after the tally."""
+    """Return the result for ``share`` of the marks. ``reason`` gives the reason, after the tally."""
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
         marks=compute_marks(criterion.marks, share),
         max_marks=criterion.marks,
-        message=_describe_tally(criterion, found) + words + _describe_first_mistake(found.samples, trials),
+        message=_describe_tally(criterion, classification)
+        + reason
+        + _describe_first_mistake(classification.samples, trials),
         visibility=criterion.visibility,
-        evidence=found.evidence,
-        accuracy=found.accuracy,
-        predictions=found.predictions,
+        evidence=classification.evidence,
+        accuracy=classification.accuracy,
+        predictions=classification.predictions,
         curves=curves,
     )
 
@@ -221,64 +228,80 @@ def _collect_counted_samples(
     criterion: Recognition,
     index: int,
     trial: TrialResult,
-    own: list[Sample],
+    trial_images: list[Sample],
     finder: LabelFinder,
 ) -> Sequence[Sample]:
     """Return a trial's images or patterns. Missing ones are replaced by wrong answers."""
     if criterion.each_pattern is None:
         # Near the start there is one thing to see. Otherwise a robot could send more images of what it is sure of.
-        apart = max(_SAME_PLACE_MM, 2 * (criterion.near_start or 0.0))
-        counted = group_by_pattern(own, trial.recording, "majority", apart)
+        radius = max(_SAME_PLACE_MM, 2 * (criterion.near_start or 0.0))
+        counted_samples = group_by_pattern(trial_images, trial.recording, "majority", radius)
     else:
         # Grey patches are read by the right sensor.
         side: Side = "right" if criterion.truth == "grey" else "left"
-        apart = max(30.0, 2 * criterion.within)
-        counted = group_by_pattern(own, trial.recording, criterion.each_pattern, apart, side)
-    if counted and len(counted) >= criterion.patterns:
-        return counted
-    if not counted and criterion.patterns <= 1:
+        radius = max(30.0, 2 * criterion.within)
+        counted_samples = group_by_pattern(trial_images, trial.recording, criterion.each_pattern, radius, side)
+    if counted_samples and len(counted_samples) >= criterion.patterns:
+        return counted_samples
+    if not counted_samples and criterion.patterns <= 1:
         truth = find_missing_label(criterion, trial)
-        sent = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
+        problem = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
         if criterion.near_start is not None and trial.recording.images:
-            sent += f" from within {criterion.near_start:g} mm of where it started"
-        return [Sample(index, None, finder.to_canonical(truth), None, sent)]
-    words = f"the robot sent images of {len(counted)} patterns, and {criterion.patterns} were expected"
-    lacking = Sample(index, None, NO_IMAGE, None, words)
-    return [*counted, *[lacking] * (criterion.patterns - len(counted))]
+            problem += f" from within {criterion.near_start:g} mm of where it started"
+        return [Sample(index, None, finder.to_canonical(truth), None, problem)]
+    description = f"the robot sent images of {len(counted_samples)} patterns, and {criterion.patterns} were expected"
+    missing_sample = Sample(index, None, NO_IMAGE, None, description)
+    return [*counted_samples, *[missing_sample] * (criterion.patterns - len(counted_samples))]
 
 
 def _compute_accuracy(samples: Sequence[Sample], labels: tuple[str, ...], counts: Counts) -> Accuracy:
-    right = sum(sample.is_correct for sample in samples)
+    correct_count = sum(sample.is_correct for sample in samples)
     count = len(samples)
-    low, high = compute_wilson_interval(right, count)
+    low, high = compute_wilson_interval(correct_count, count)
     cells = Counter((sample.truth, sample.answer) for sample in samples)
     confusion = tuple(
         (truth, answer, number)
         for (truth, answer), number in sorted(cells.items(), key=lambda item: (item[0][0], item[0][1] or ""))
     )
-    known = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
+    all_labels = tuple(dict.fromkeys([*labels, *(sample.truth for sample in samples)]))
     return Accuracy(
-        right / count if count else 0.0, low, high, count, known, confusion, counts, _compute_confidence(samples)
+        correct_count / count if count else 0.0,
+        low,
+        high,
+        count,
+        all_labels,
+        confusion,
+        counts,
+        _compute_confidence(samples),
     )
 
 
 def _compute_confidence(samples: Sequence[Sample]) -> Confidence | None:
     """Return the mean confidence of correct and wrong answers; None if no answer had one."""
-    right = [sample.confidence for sample in samples if sample.is_correct and sample.confidence is not None]
-    wrong = [sample.confidence for sample in samples if not sample.is_correct and sample.confidence is not None]
-    if not right and not wrong:
+    correct_confidences = [
+        sample.confidence for sample in samples if sample.is_correct and sample.confidence is not None
+    ]
+    wrong_confidences = [
+        sample.confidence for sample in samples if not sample.is_correct and sample.confidence is not None
+    ]
+    if not correct_confidences and not wrong_confidences:
         return None
-    return Confidence(fmean(right) if right else None, len(right), fmean(wrong) if wrong else None, len(wrong))
+    return Confidence(
+        fmean(correct_confidences) if correct_confidences else None,
+        len(correct_confidences),
+        fmean(wrong_confidences) if wrong_confidences else None,
+        len(wrong_confidences),
+    )
 
 
-def _build_evidence(index: int, own: Sequence[Sample]) -> Evidence:
+def _build_evidence(index: int, samples: Sequence[Sample]) -> Evidence:
     """Return the first image of the trial that was misidentified, otherwise its last."""
-    shown = next((sample for sample in own if not sample.is_correct), own[-1])
-    image = shown.image
+    example = next((sample for sample in samples if not sample.is_correct), samples[-1])
+    image = example.image
     return Evidence(
         trial=index,
-        passed=all(sample.is_correct for sample in own),
-        message=describe_sample(shown),
+        passed=all(sample.is_correct for sample in samples),
+        message=describe_sample(example),
         t=image.t if image else None,
         pose=image.pose if image else None,
     )
@@ -289,13 +312,13 @@ def _collect_replies(criterion: Recognition, recording: Recording) -> list[Reply
     if criterion.answer_from == "reply":
         answers = Answers(recording)
         return [find_reply(recording, answers, number) for number in range(len(recording.images))]
-    said = "said" if criterion.answer_from == "speech" else "printed"
+    verb = "said" if criterion.answer_from == "speech" else "printed"
     replies = []
     for image in recording.images:
-        heard = _list_lines_between(recording, image, criterion.answer_from == "speech")
-        text = " | ".join(line.text for line in heard)
-        silent = Reply("unanswered", None, f"the robot {said} nothing after the image")
-        replies.append(Reply("answered", text, "") if heard else silent)
+        answer_lines = _list_lines_between(recording, image, criterion.answer_from == "speech")
+        text = " | ".join(line.text for line in answer_lines)
+        missing_reply = Reply("unanswered", None, f"the robot {verb} nothing after the image")
+        replies.append(Reply("answered", text, "") if answer_lines else missing_reply)
     return replies
 
 
@@ -311,14 +334,14 @@ def _read_answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> t
         if criterion.confidence is not None:
             confidence = _parse_probability(find_at_path(value, criterion.confidence))
         if criterion.answer is not None:
-            picked = find_at_path(value, criterion.answer)
-            text = text if picked is MISSING else as_text(picked)
-    found = finder.find_labels(text)
-    if not found:
+            answer_value = find_at_path(value, criterion.answer)
+            text = text if answer_value is MISSING else as_text(answer_value)
+    found_labels = finder.find_labels(text)
+    if not found_labels:
         return None, f"the answer names no label: {quote_text(text)}", confidence
-    if len(found) > 1:
-        return None, f"the answer names more than one label: {' and '.join(map(quote_text, found))}", confidence
-    return found[0], f"it was identified as {quote_text(found[0])}", confidence
+    if len(found_labels) > 1:
+        return None, f"the answer names more than one label: {' and '.join(map(quote_text, found_labels))}", confidence
+    return found_labels[0], f"it was identified as {quote_text(found_labels[0])}", confidence
 
 
 def _parse_probability(value: object) -> float | None:
@@ -330,8 +353,8 @@ def _parse_probability(value: object) -> float | None:
 
 def _list_lines_between(recording: Recording, image: Image, speech: bool) -> Sequence[TimedText]:
     """Return what the robot said or printed after this image and before the next."""
-    following = bisect_right(recording.images, image.message, key=lambda other: other.message)
-    end = recording.images[following].t if following < len(recording.images) else math.inf
+    next_index = bisect_right(recording.images, image.message, key=lambda other: other.message)
+    end = recording.images[next_index].t if next_index < len(recording.images) else math.inf
     lines = recording.spoken if speech else recording.printed
     return lines[bisect_left(lines, image.t, key=_get_time) : bisect_left(lines, end, key=_get_time)]
 
@@ -348,19 +371,19 @@ def describe_counts(counts: Counts) -> str:
     )
 
 
-def _describe_tally(criterion: Recognition, found: ClassificationResult) -> str:
-    accuracy = found.accuracy
-    what = "images" if criterion.each_pattern is None else "patterns"
-    words = (
-        f"{found.correct_count} of {accuracy.n} {what} identified correctly: accuracy {accuracy.value:.2f} "
+def _describe_tally(criterion: Recognition, classification: ClassificationResult) -> str:
+    accuracy = classification.accuracy
+    unit = "images" if criterion.each_pattern is None else "patterns"
+    text = (
+        f"{classification.correct_count} of {accuracy.n} {unit} identified correctly: accuracy {accuracy.value:.2f} "
         f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
     )
     counts = accuracy.counts
     if counts is not None and (counts.answered != counts.sent or counts.duplicates):
-        words += f" {describe_counts(counts)}."
+        text += f" {describe_counts(counts)}."
     confidence = accuracy.confidence
     if confidence is not None:
-        sure = [
+        confidences = [
             f"{mean:.2f} when {how} ({count})"
             for mean, count, how in (
                 (confidence.right, confidence.n_right, "right"),
@@ -368,17 +391,17 @@ def _describe_tally(criterion: Recognition, found: ClassificationResult) -> str:
             )
             if mean is not None
         ]
-        words += f" Mean confidence {' and '.join(sure)}."
-    return words
+        text += f" Mean confidence {' and '.join(confidences)}."
+    return text
 
 
 def _describe_first_mistake(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
     """Return the place of the first misidentified image; empty if there is none."""
-    first = next((sample for sample in samples if not sample.is_correct), None)
-    if first is None:
+    mistake = next((sample for sample in samples if not sample.is_correct), None)
+    if mistake is None:
         return ""
-    trial = trials[first.trial]
+    trial = trials[mistake.trial]
     return (
-        f" {describe_place(trial, first.image.t if first.image else None)}: "
-        f"{describe_sample(first)}{describe_early_end(trial)}"
+        f" {describe_place(trial, mistake.image.t if mistake.image else None)}: "
+        f"{describe_sample(mistake)}{describe_early_end(trial)}"
     )

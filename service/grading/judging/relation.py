@@ -26,32 +26,46 @@ _EQUAL_TOLERANCE = 0.05
 def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
     """Judge the fraction of pairs of moments with the required relation. The score compares it with the target."""
     recording = trial.recording
-    moving = np.flatnonzero(~compute_still_mask(recording))
-    rows = moving[np.unique(np.linspace(0, len(moving) - 1, _MAX_MOMENTS).astype(int))] if len(moving) else moving
+    moving_ticks = np.flatnonzero(~compute_still_mask(recording))
+    rows = (
+        moving_ticks[np.unique(np.linspace(0, len(moving_ticks) - 1, _MAX_MOMENTS).astype(int))]
+        if len(moving_ticks)
+        else moving_ticks
+    )
     t, end = recording.end_t, recording.end
     lower = "lower" if criterion.goes == "with" else "higher"
-    asked = f"Expected {criterion.of} to be {lower} where {criterion.to} is lower"
+    expectation = f"Expected {criterion.of} to be {lower} where {criterion.to} is lower"
     if len(rows) < 2:
-        return fail_with(f"{asked}, but the robot hardly moved.", t, end)
-    of, to = _read_series(criterion.of, recording)[rows], _read_series(criterion.to, recording)[rows]
-    alike, differing = _count_agreeing_pairs(of, to if criterion.goes == "with" else -to)
-    share = Fraction(alike, differing) if differing else Fraction(0)
+        return fail_with(f"{expectation}, but the robot hardly moved.", t, end)
+    checked_values, reference_values = (
+        _read_series(criterion.of, recording)[rows],
+        _read_series(criterion.to, recording)[rows],
+    )
+    agreeing_pairs, differing_pairs = _count_agreeing_pairs(
+        checked_values, reference_values if criterion.goes == "with" else -reference_values
+    )
+    share = Fraction(agreeing_pairs, differing_pairs) if differing_pairs else Fraction(0)
     measures = (
         Measure("share of pairs", float(share)),
-        Measure("least", float(of.min())),
-        Measure("most", float(of.max())),
+        Measure("least", float(checked_values.min())),
+        Measure("most", float(checked_values.max())),
     )
-    span = f"it was from {of.min():.3g} to {of.max():.3g} while the robot moved"
-    if np.ptp(of) < criterion.changes or not differing:
-        by = f" by {criterion.changes:g} or more" if criterion.changes else ""
+    span = f"it was from {checked_values.min():.3g} to {checked_values.max():.3g} while the robot moved"
+    if np.ptp(checked_values) < criterion.changes or not differing_pairs:
+        amount_clause = f" by {criterion.changes:g} or more" if criterion.changes else ""
         return fail_with(
-            f"Expected {criterion.of} to change with {criterion.to}{by}, but {span}.", t, end, measures=measures
+            f"Expected {criterion.of} to change with {criterion.to}{amount_clause}, but {span}.",
+            t,
+            end,
+            measures=measures,
         )
-    told = f"true for {float(share):.0%} of all pairs of moments"
+    result_text = f"true for {float(share):.0%} of all pairs of moments"
     if share >= Fraction(str(criterion.at_least)):
-        return pass_with(f"As expected, {criterion.of} was {lower} where {criterion.to} was: {told}.", t, end, measures)
+        return pass_with(
+            f"As expected, {criterion.of} was {lower} where {criterion.to} was: {result_text}.", t, end, measures
+        )
     return fail_with(
-        f"{asked} in {criterion.at_least:.0%} or more of all pairs of moments, but this was true for "
+        f"{expectation} in {criterion.at_least:.0%} or more of all pairs of moments, but this was true for "
         f"{float(share):.0%}; {span}.",
         t,
         end,
@@ -60,18 +74,23 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
     )
 
 
-def _count_agreeing_pairs(of: Floats, to: Floats) -> tuple[int, int]:
+def _count_agreeing_pairs(checked_values: Floats, reference_values: Floats) -> tuple[int, int]:
     """Return the number of pairs in which both series differ in the same direction, and in which both differ."""
-    one, other = np.triu_indices(len(of), 1)
-    by_of, by_to = of[one] - of[other], to[one] - to[other]
-    both = (np.abs(by_of) > _EQUAL_TOLERANCE * np.ptp(of)) & (np.abs(by_to) > _EQUAL_TOLERANCE * np.ptp(to))
-    return int((both & (by_of * by_to > 0)).sum()), int(both.sum())
+    first_indices, second_indices = np.triu_indices(len(checked_values), 1)
+    checked_differences, reference_differences = (
+        checked_values[first_indices] - checked_values[second_indices],
+        reference_values[first_indices] - reference_values[second_indices],
+    )
+    is_different = (np.abs(checked_differences) > _EQUAL_TOLERANCE * np.ptp(checked_values)) & (
+        np.abs(reference_differences) > _EQUAL_TOLERANCE * np.ptp(reference_values)
+    )
+    return int((is_different & (checked_differences * reference_differences > 0)).sum()), int(is_different.sum())
 
 
 def _read_series(name: Series, recording: Recording) -> Floats:
     """Return a value for each tick, shape (n,)."""
     ticks = recording.ticks
-    ahead, turned = compute_travel(recording)
+    forward_steps, turns = compute_travel(recording)
     match name:
         case "time":
             return compute_times(recording)[1:]
@@ -82,9 +101,9 @@ def _read_series(name: Series, recording: Recording) -> Floats:
         case "heading":
             return compute_headings(recording)[1:]
         case "speed":
-            return np.abs(ahead) * ticks.per_second
+            return np.abs(forward_steps) * ticks.per_second
         case "turning":
-            return np.abs(turned) * ticks.per_second
+            return np.abs(turns) * ticks.per_second
         case "left wheel speed" | "right wheel speed":
             wheel = ticks.left_position if name == "left wheel speed" else ticks.right_position
             return np.abs(np.diff(wheel, prepend=0.0)) * ticks.per_second

@@ -41,132 +41,154 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     """Judge the answer to each expected text, or to each different question that arrived."""
     pair = build_pair(criterion, trial.recording)
     recording = pair.recording
-    sent = [message for message in recording.messages if message.sender == "robot"]
-    asked = [
+    sent_messages = [message for message in recording.messages if message.sender == "robot"]
+    received_messages = [
         (index, message)
         for index, message in enumerate(recording.messages)
         if message.sender == "robot" and message.delivered is not None
     ]
     if criterion.expect:
-        return _judge_expected(criterion, asked, sent, pair)
+        return _judge_expected(criterion, received_messages, sent_messages, pair)
     if criterion.in_order:
-        return _judge_order(criterion, asked, pair)
+        return _judge_order(criterion, received_messages, pair)
     # A repeated message asks nothing new.
     questions: dict[str, list[tuple[int, Message]]] = {}
-    for index, message in asked:
+    for index, message in received_messages:
         if _is_question(criterion, message.received):
             questions.setdefault(message.received, []).append((index, message))
     count = len(questions)
-    unheard = [each for each in sent if each.text not in questions and _is_question(criterion, each.text)]
-    excused = len({message.text for message in unheard if is_lost_by_chance(message)})
-    if count + excused < criterion.at_least:
-        few = f"only {count} different reached it" if count else "none reached it"
-        astray = next((message for message in unheard if is_out_of_reach(message)), None)
-        why = f": the channel lost {quote_text(astray.text)} ({describe_loss(astray)})" if astray else ""
-        wanted = f"at least {criterion.at_least} of {_describe_messages(criterion, pair)}"
-        return fail_with(f"Expected {pair.receiver_name} to be sent {wanted}, but {few}{why}.", score=Fraction(0))
-    if excused and not count:
+    unreceived_messages = [
+        each for each in sent_messages if each.text not in questions and _is_question(criterion, each.text)
+    ]
+    excused_count = len({message.text for message in unreceived_messages if is_lost_by_chance(message)})
+    if count + excused_count < criterion.at_least:
+        count_clause = f"only {count} different reached it" if count else "none reached it"
+        unreachable_message = next((message for message in unreceived_messages if is_out_of_reach(message)), None)
+        reason = (
+            f": the channel lost {quote_text(unreachable_message.text)} ({describe_loss(unreachable_message)})"
+            if unreachable_message
+            else ""
+        )
+        requirement = f"at least {criterion.at_least} of {_describe_messages(criterion, pair)}"
+        return fail_with(
+            f"Expected {pair.receiver_name} to be sent {requirement}, but {count_clause}{reason}.", score=Fraction(0)
+        )
+    if excused_count and not count:
         return pass_with(_NOTHING_TO_ANSWER)
     answers = Answers(recording)
-    wrong: list[tuple[Message, str]] = []
-    for times in questions.values():
-        mistakes = ((message, _describe_mistake(criterion, answers, index)) for index, message in times)
-        wrong += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
-    if not wrong:
+    wrong_answers: list[tuple[Message, str]] = []
+    for attempts in questions.values():
+        mistakes = ((message, _describe_mistake(criterion, answers, index)) for index, message in attempts)
+        wrong_answers += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
+    if not wrong_answers:
         return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
-    message, mistake = min(wrong, key=lambda pair: pair[0].t)
-    right = count - len(wrong)
+    message, mistake = min(wrong_answers, key=lambda pair: pair[0].t)
+    right_count = count - len(wrong_answers)
     return fail_with(
         f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
         f"{_describe_expected(criterion)}, but {mistake} "
-        f"({right} of {count} answered as expected).",
+        f"({right_count} of {count} answered as expected).",
         message.t,
         get_pose_at(recording, message.t),
-        Fraction(right, count),
+        Fraction(right_count, count),
     )
 
 
 def _judge_expected(
-    criterion: Replies, asked: list[tuple[int, Message]], sent: list[Message], pair: AgentPair
+    criterion: Replies, received_messages: list[tuple[int, Message]], sent_messages: list[Message], pair: AgentPair
 ) -> Outcome:
     """Judge the expected texts, without those lost by chance, which the responder could not answer."""
     answers = Answers(pair.recording)
-    right = count = 0
-    first: Outcome | None = None
+    right_count = count = 0
+    first_failure: Outcome | None = None
     for text, answer in criterion.expect.items():
-        heard = [(index, each) for index, each in asked if is_same_text(each.received, text, criterion.ignore_case)]
-        right_ones = list_allowed_answers(answer)
-        words = " or ".join(quote_text(as_text(each)) for each in right_ones)
-        wanted = words + (f" at {criterion.path}" if criterion.path else "")
-        if not heard:
-            tries = [message for message in sent if is_same_text(message.text, text, criterion.ignore_case)]
+        matching_messages = [
+            (index, each)
+            for index, each in received_messages
+            if is_same_text(each.received, text, criterion.ignore_case)
+        ]
+        allowed_answers = list_allowed_answers(answer)
+        answer_texts = " or ".join(quote_text(as_text(each)) for each in allowed_answers)
+        expected_answer = answer_texts + (f" at {criterion.path}" if criterion.path else "")
+        if not matching_messages:
+            tries = [message for message in sent_messages if is_same_text(message.text, text, criterion.ignore_case)]
             if tries and all(map(is_lost_by_chance, tries)):
                 continue
             outcome = fail_with(
-                f"Expected {pair.receiver_name} to be sent {quote_text(text)}, but {_explain_unsent(tries, sent)}."
+                f"Expected {pair.receiver_name} to be sent {quote_text(text)}, but "
+                f"{_explain_unsent(tries, sent_messages)}."
             )
         else:
-            mistakes = [_describe_wrong_answer(criterion, answers, index, right_ones) for index, _ in heard]
-            place = next((i for i, mistake in enumerate(mistakes) if mistake), None)
-            if place is None:
-                right += 1
+            mistakes = [
+                _describe_wrong_answer(criterion, answers, index, allowed_answers) for index, _ in matching_messages
+            ]
+            wrong_index = next((i for i, mistake in enumerate(mistakes) if mistake), None)
+            if wrong_index is None:
+                right_count += 1
                 count += 1
                 continue
-            message = heard[place][1]
+            message = matching_messages[wrong_index][1]
             outcome = fail_with(
-                f"Expected {pair.receiver_name} to answer {quote_text(text)} with {wanted}, but {mistakes[place]}.",
+                f"Expected {pair.receiver_name} to answer {quote_text(text)} with {expected_answer}, but "
+                f"{mistakes[wrong_index]}.",
                 message.t,
                 get_pose_at(pair.recording, message.t),
             )
-        first = first or outcome
+        first_failure = first_failure or outcome
         count += 1
-    if first is None and not count:
+    if first_failure is None and not count:
         return pass_with(_NOTHING_TO_ANSWER)
-    if first is None:
+    if first_failure is None:
         return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
-    return fail_with(f"{first.message[:-1]} ({right} of {count} right).", first.t, first.pose, Fraction(right, count))
+    return fail_with(
+        f"{first_failure.message[:-1]} ({right_count} of {count} right).",
+        first_failure.t,
+        first_failure.pose,
+        Fraction(right_count, count),
+    )
 
 
-def _judge_order(criterion: Replies, asked: list[tuple[int, Message]], pair: AgentPair) -> Outcome:
+def _judge_order(criterion: Replies, received_messages: list[tuple[int, Message]], pair: AgentPair) -> Outcome:
     """Judge the answers to all questions, in order, against the list."""
     answers = Answers(pair.recording)
-    heard = [(index, each) for index, each in asked if _is_question(criterion, each.received)]
-    wrong = [
+    questions = [(index, each) for index, each in received_messages if _is_question(criterion, each.received)]
+    wrong_answers = [
         (message, wanted, mistake)
-        for (index, message), wanted in zip(heard, criterion.in_order, strict=False)
+        for (index, message), wanted in zip(questions, criterion.in_order, strict=False)
         if (mistake := _describe_mismatch(criterion, answers, index, wanted))
     ]
     count = len(criterion.in_order)
-    right = max(0, min(count, len(heard)) - len(wrong) - max(0, len(heard) - count))
-    score = Fraction(right, count)
-    if wrong:
-        message, wanted, mistake = wrong[0]
+    right_count = max(0, min(count, len(questions)) - len(wrong_answers) - max(0, len(questions) - count))
+    score = Fraction(right_count, count)
+    if wrong_answers:
+        message, expected_answer, mistake = wrong_answers[0]
         return fail_with(
-            f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with {quote_text(wanted)}, "
+            f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
+            f"{quote_text(expected_answer)}, "
             f"but {mistake} "
-            f"({right} of {count} right).",
+            f"({right_count} of {count} right).",
             message.t,
             get_pose_at(pair.recording, message.t),
             score,
         )
-    if len(heard) != count:
-        few = f"{len(heard)} reached it" if heard else "none reached it"
-        return fail_with(f"Expected {pair.receiver_name} to answer {count} messages, but {few}.", score=score)
+    if len(questions) != count:
+        count_clause = f"{len(questions)} reached it" if questions else "none reached it"
+        return fail_with(f"Expected {pair.receiver_name} to answer {count} messages, but {count_clause}.", score=score)
     return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
 
 
-def _explain_unsent(tries: Sequence[Message], sent: Sequence[Message]) -> str:
+def _explain_unsent(tries: Sequence[Message], sent_messages: Sequence[Message]) -> str:
     """Return why a text never reached the responder, and what was sent instead."""
-    astray = next((message for message in tries if is_out_of_reach(message)), None)
-    if astray:
-        return f"the channel lost it ({describe_loss(astray)})"
-    texts = tuple(dict.fromkeys(message.text for message in sent if len(message.text) <= _LONGEST_SENT))
+    unreachable_message = next((message for message in tries if is_out_of_reach(message)), None)
+    if unreachable_message:
+        return f"the channel lost it ({describe_loss(unreachable_message)})"
+    texts = tuple(dict.fromkeys(message.text for message in sent_messages if len(message.text) <= _LONGEST_SENT))
     return f"it was not; it was sent {quote_list(texts[:_MOST_SENT])}" if texts else "it was not"
 
 
-def _describe_wrong_answer(criterion: Replies, answers: Answers, index: int, right_ones: Sequence[object]) -> str:
+def _describe_wrong_answer(criterion: Replies, answers: Answers, index: int, allowed_answers: Sequence[object]) -> str:
     """Return the problem with the answer to the message at ``index``; empty if it is one of the correct ones."""
-    mistakes = [_describe_mismatch(criterion, answers, index, each) for each in right_ones]
+    mistakes = [_describe_mismatch(criterion, answers, index, each) for each in allowed_answers]
     return "" if "" in mistakes else mistakes[0] if mistakes else "no answer is correct"
 
 
@@ -178,20 +200,20 @@ def _describe_mismatch(criterion: Replies, answers: Answers, index: int, answer:
     if criterion.is_json and not is_json_answer(reply.text):
         return f"it answered {quote_text(reply.text)}, which is not JSON:: and well-formed JSON"
     if criterion.agents:
-        said = parse_json_answer(JSON + reply.text) if reply.note == VALUE else reply.text
-        mistake = "it answered " + ("the text " if isinstance(said, str) else "") + quote_text(reply.text)
-        return "" if is_same_value(said, answer) else mistake
+        value = parse_json_answer(JSON + reply.text) if reply.note == VALUE else reply.text
+        mistake = "it answered " + ("the text " if isinstance(value, str) else "") + quote_text(reply.text)
+        return "" if is_same_value(value, answer) else mistake
     if criterion.path is None:
-        same = is_same_text(reply.text, str(answer), criterion.ignore_case)
-        return "" if same else f"it answered {quote_text(reply.text)}"
-    found = find_at_path(parse_json_answer(reply.text), criterion.path)
-    if found is MISSING:
+        is_same = is_same_text(reply.text, str(answer), criterion.ignore_case)
+        return "" if is_same else f"it answered {quote_text(reply.text)}"
+    actual = find_at_path(parse_json_answer(reply.text), criterion.path)
+    if actual is MISSING:
         return f"there is nothing at {criterion.path} in its answer {quote_text(reply.text)}"
-    if isinstance(found, str) and isinstance(answer, str):
-        same = is_same_text(found, answer, criterion.ignore_case)
+    if isinstance(actual, str) and isinstance(answer, str):
+        is_same = is_same_text(actual, answer, criterion.ignore_case)
     else:
-        same = is_same_value(found, answer)
-    return "" if same else f"it has {quote_text(as_text(found))} at {criterion.path}"
+        is_same = is_same_value(actual, answer)
+    return "" if is_same else f"it has {quote_text(as_text(actual))} at {criterion.path}"
 
 
 def _describe_mistake(criterion: Replies, answers: Answers, index: int) -> str:
@@ -203,12 +225,12 @@ def _describe_mistake(criterion: Replies, answers: Answers, index: int) -> str:
         return f"it answered {quote_text(reply.text)}, which is not JSON:: and well-formed JSON"
     text = reply.text
     if criterion.path is not None:
-        found = find_at_path(parse_json_answer(reply.text), criterion.path)
-        if found is MISSING:
+        actual = find_at_path(parse_json_answer(reply.text), criterion.path)
+        if actual is MISSING:
             return f"there is nothing at {criterion.path} in its answer {quote_text(reply.text)}"
-        if criterion.value is not None and not is_same_value(found, criterion.value):
-            return f"it has {quote_text(as_text(found))} at {criterion.path}"
-        text = as_text(found)
+        if criterion.value is not None and not is_same_value(actual, criterion.value):
+            return f"it has {quote_text(as_text(actual))} at {criterion.path}"
+        text = as_text(actual)
     return "" if is_accepted_text(criterion, text) else f"it answered {quote_text(text)}"
 
 
@@ -227,12 +249,12 @@ def _describe_messages(criterion: Replies, pair: AgentPair) -> str:
 
 
 def _describe_expected(criterion: Replies) -> str:
-    words = ["JSON"] if criterion.is_json else []
-    there = f" at {criterion.path}" if criterion.path else ""
+    clauses = ["JSON"] if criterion.is_json else []
+    path_clause = f" at {criterion.path}" if criterion.path else ""
     if criterion.value is not None:
-        words.append(f"{quote_text(as_text(criterion.value))}{there}")
+        clauses.append(f"{quote_text(as_text(criterion.value))}{path_clause}")
     elif criterion.has_conditions:
-        words.append(f"{describe_conditions(criterion)}{there}")
-    elif there:
-        words.append(f"something{there}")
-    return " and ".join(words) or "a text"
+        clauses.append(f"{describe_conditions(criterion)}{path_clause}")
+    elif path_clause:
+        clauses.append(f"something{path_clause}")
+    return " and ".join(clauses) or "a text"

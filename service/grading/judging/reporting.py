@@ -32,49 +32,54 @@ NO_LABEL = "nothing"
 @declare_judge(Reports)
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     """Judge a report by searching for the entries of the trial's pose, in order."""
-    wanted = _find_expected_row(criterion, trial)
+    answer_row = _find_expected_row(criterion, trial)
     lines = _collect_texts(criterion, trial.recording)
-    told = [(token, line.t) for line in lines for token in tokenize_text(line.text)]
+    timed_tokens = [(token, line.t) for line in lines for token in tokenize_text(line.text)]
     rows = _collect_rows(criterion, trial.recording)
-    outcome = _judge_report(criterion, wanted, rows, [line.text for line in lines], [token for token, _ in told])
-    guesses = _count_guesses(criterion, wanted, told, trial.recording)
+    outcome = _judge_report(
+        criterion, answer_row, rows, [line.text for line in lines], [token for token, _ in timed_tokens]
+    )
+    guesses = _count_guesses(criterion, answer_row, timed_tokens, trial.recording)
     return apply_stray_penalty(
-        outcome, criterion, len(wanted), Strays(f"{guesses} other numbers were reported as well", others=guesses)
+        outcome, criterion, len(answer_row), Strays(f"{guesses} other numbers were reported as well", others=guesses)
     )
 
 
 def _judge_report(
-    criterion: Reports, wanted: Row, rows: frozenset[Row], texts: Sequence[str], tokens: Sequence[Token]
+    criterion: Reports, answer_row: Row, rows: frozenset[Row], texts: Sequence[str], tokens: Sequence[Token]
 ) -> Outcome:
-    who = "the responder" if criterion.source == "reply" else "the program"
-    deed = _VERBS[criterion.source]
-    asked = f"Expected {who} to {deed} {_format_entries(wanted)}{_describe_tolerance(criterion, wanted)}"
-    if not texts:
-        return fail_with(f"{asked}, but it did not {deed} anything.")
-    report = ReportTokens(tokens, rows, criterion.leeway)
-    found = report.find(wanted)
-    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(found.values, 1))
-    heard = quote_text(" | ".join(texts))
-    foreign = _describe_forbidden_text(criterion, wanted, tokens) or _describe_other_label(
-        criterion, wanted, rows, report
+    part_name = "the responder" if criterion.source == "reply" else "the program"
+    verb = _VERBS[criterion.source]
+    expectation = (
+        f"Expected {part_name} to {verb} {_format_entries(answer_row)}{_describe_tolerance(criterion, answer_row)}"
     )
-    if foreign:
-        return fail_with(f"{asked}, but {foreign}: {heard}.", measures=measures)
-    guessed = _is_guess(criterion, wanted, report, found.count)
-    if found.count < len(wanted):
-        missing = _format_entries(wanted[found.count : found.count + 1])
-        where = f" after {_format_entries(wanted[found.count - 1 : found.count])}" if found.count else ""
-        beside = ", and it reported as many entries of most other poses" if guessed else ""
+    if not texts:
+        return fail_with(f"{expectation}, but it did not {verb} anything.")
+    report = ReportTokens(tokens, rows, criterion.leeway)
+    match = report.find(answer_row)
+    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(match.values, 1))
+    report_text = quote_text(" | ".join(texts))
+    problem = _describe_forbidden_text(criterion, answer_row, tokens) or _describe_other_label(
+        criterion, answer_row, rows, report
+    )
+    if problem:
+        return fail_with(f"{expectation}, but {problem}: {report_text}.", measures=measures)
+    is_guess = _is_guess(criterion, answer_row, report, match.count)
+    if match.count < len(answer_row):
+        missing_entry = _format_entries(answer_row[match.count : match.count + 1])
+        position_clause = f" after {_format_entries(answer_row[match.count - 1 : match.count])}" if match.count else ""
+        guess_clause = ", and it reported as many entries of most other poses" if is_guess else ""
         return fail_with(
-            f"{asked}, but {missing} did not come{where}{beside}: {heard}.",
-            score=Fraction(0 if guessed else found.count, len(wanted)),
+            f"{expectation}, but {missing_entry} did not come{position_clause}{guess_clause}: {report_text}.",
+            score=Fraction(0 if is_guess else match.count, len(answer_row)),
             measures=measures,
         )
-    if guessed:
+    if is_guess:
         return fail_with(
-            f"{asked} and no entries of other poses, but it reported those as well: {heard}.", measures=measures
+            f"{expectation} and no entries of other poses, but it reported those as well: {report_text}.",
+            measures=measures,
         )
-    return pass_with(f"{who.capitalize()} reported {_format_entries(wanted)}.", measures=measures)
+    return pass_with(f"{part_name.capitalize()} reported {_format_entries(answer_row)}.", measures=measures)
 
 
 def _find_expected_row(criterion: Reports, trial: TrialResult) -> Row:
@@ -108,84 +113,86 @@ def _collect_texts(criterion: Reports, recording: Recording) -> list[TimedText]:
         return [
             TimedText(m.t, m.text) for m in recording.messages if m.sender == "responder" and m.note != "duplicated"
         ]
-    printed = recording.printed if criterion.source != "speech" else ()
+    printed_lines = recording.printed if criterion.source != "speech" else ()
     # Text from say() is also printed, and would be counted twice.
-    spoken = recording.spoken if criterion.source == "speech" else ()
+    spoken_lines = recording.spoken if criterion.source == "speech" else ()
     if criterion.source == "either":
-        shown = {(line.t, line.text) for line in printed}
-        spoken = tuple(line for line in recording.spoken if (line.t, line.text) not in shown)
-    return sorted([*printed, *spoken], key=lambda line: line.t)
+        printed_keys = {(line.t, line.text) for line in printed_lines}
+        spoken_lines = tuple(line for line in recording.spoken if (line.t, line.text) not in printed_keys)
+    return sorted([*printed_lines, *spoken_lines], key=lambda line: line.t)
 
 
 def _count_guesses(
-    criterion: Reports, wanted: Sequence[Entry], told: Sequence[tuple[Token, float]], recording: Recording
+    criterion: Reports, answer_row: Sequence[Entry], timed_tokens: Sequence[tuple[Token, float]], recording: Recording
 ) -> int:
     """Return how many numbers were neither required nor read, allowing one (its time or count) for each reading."""
-    others = [
+    other_numbers = [
         (token.value, t)
-        for token, t in told
-        if token.value is not None and not _is_one_of(token.value, wanted, criterion.leeway)
+        for token, t in timed_tokens
+        if token.value is not None and not _is_one_of(token.value, answer_row, criterion.leeway)
     ]
-    values, at = [value for value, _ in others], [t for _, t in others]
-    read = int(match_readings(values, at, INSTRUMENTS, recording).sum())
-    return max(len(others) - 2 * read, 0)
+    values, times = [value for value, _ in other_numbers], [t for _, t in other_numbers]
+    read_count = int(match_readings(values, times, INSTRUMENTS, recording).sum())
+    return max(len(other_numbers) - 2 * read_count, 0)
 
 
-def _is_one_of(value: float, wanted: Sequence[Entry], tolerance: float) -> bool:
-    return any(is_near(value, entry, tolerance) for entry in wanted if not isinstance(entry, str))
+def _is_one_of(value: float, entries: Sequence[Entry], tolerance: float) -> bool:
+    return any(is_near(value, entry, tolerance) for entry in entries if not isinstance(entry, str))
 
 
-def _is_guess(criterion: Reports, wanted: Row, report: ReportTokens, count: int) -> bool:
+def _is_guess(criterion: Reports, answer_row: Row, report: ReportTokens, count: int) -> bool:
     """Return whether the report contains the first ``count`` entries of more than half of the poses.
 
-    It is a guess only if the answers of these poses differ. Once all entries of ``wanted`` are found, only complete
+    It is a guess only if the answers of these poses differ. Once all entries of ``answer_row`` are found, only complete
     rows of other poses count. Poses are counted, not rows, because a row shared by many poses is easier to guess.
     """
     if criterion.expected == "label" or not count:
         return False
-    whole = count == len(wanted)
-    reported = {
+    is_complete = count == len(answer_row)
+    reported_rows = {
         row
         for row in frozenset(criterion.expected)
-        if report.find(row).count >= (len(row) if whole else min(count, len(row)))
+        if report.find(row).count >= (len(row) if is_complete else min(count, len(row)))
     }
-    is_same = can_match_row if whole else is_equivalent_row
-    if all(is_same(row, wanted, criterion.tolerance) for row in reported):
+    is_same = can_match_row if is_complete else is_equivalent_row
+    if all(is_same(row, answer_row, criterion.tolerance) for row in reported_rows):
         return False
-    return 2 * sum(row in reported for row in criterion.expected) > len(criterion.expected)
+    return 2 * sum(row in reported_rows for row in criterion.expected) > len(criterion.expected)
 
 
-def _describe_other_label(criterion: Reports, wanted: Row, rows: frozenset[Row], report: ReportTokens) -> str:
+def _describe_other_label(criterion: Reports, answer_row: Row, rows: frozenset[Row], report: ReportTokens) -> str:
     """Return a description of the other floor label that was reported; empty if none was."""
     if criterion.expected != "label":
         return ""
-    others = sorted(
-        _format_entries(row) for row in rows if report.has(row) and not can_match_row(row, wanted, criterion.leeway)
+    other_labels = sorted(
+        _format_entries(row) for row in rows if report.has(row) and not can_match_row(row, answer_row, criterion.leeway)
     )
-    return f"it named {others[0]}" if others else ""
+    return f"it named {other_labels[0]}" if other_labels else ""
 
 
-def _describe_forbidden_text(criterion: Reports, wanted: Sequence[Entry], tokens: Sequence[Token]) -> str:
+def _describe_forbidden_text(criterion: Reports, answer_row: Sequence[Entry], tokens: Sequence[Token]) -> str:
     """Return a description of a forbidden text that was reported; empty if there is none."""
-    expected = [split_words(entry) for entry in wanted if isinstance(entry, str)]
+    expected_texts = [split_words(entry) for entry in answer_row if isinstance(entry, str)]
     words = [token.word for token in tokens]
     for text in criterion.among:
         parts = split_words(text)
-        inside = any(find_words(entry, parts) is not None for entry in expected)
-        if not inside and find_words(words, parts) is not None:
+        is_expected = any(find_words(entry, parts) is not None for entry in expected_texts)
+        if not is_expected and find_words(words, parts) is not None:
             return f"it named {quote_text(text)}"
     if criterion.only:
-        others = (each for each in tokens if each.value is not None)
-        foreign = next((each for each in others if not _is_one_of(each.value or 0.0, wanted, criterion.leeway)), None)
-        if foreign is not None:
-            return f"it reported {quote_text(foreign.word)[1:-1]} as well"
+        numbers = (each for each in tokens if each.value is not None)
+        foreign_number = next(
+            (each for each in numbers if not _is_one_of(each.value or 0.0, answer_row, criterion.leeway)), None
+        )
+        if foreign_number is not None:
+            return f"it reported {quote_text(foreign_number.word)[1:-1]} as well"
     return ""
 
 
-def _describe_tolerance(criterion: Reports, wanted: Sequence[Entry]) -> str:
+def _describe_tolerance(criterion: Reports, answer_row: Sequence[Entry]) -> str:
     """Return the allowed difference of numbers in words, if it is large enough to matter."""
-    numbers = any(not isinstance(entry, str) for entry in wanted)
-    return f" (within {criterion.leeway:g})" if numbers and criterion.leeway >= 1 else ""
+    has_numbers = any(not isinstance(entry, str) for entry in answer_row)
+    return f" (within {criterion.leeway:g})" if has_numbers and criterion.leeway >= 1 else ""
 
 
 def _format_entries(entries: Sequence[Entry]) -> str:
@@ -209,21 +216,23 @@ def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     """
     mentions = _collect_mentions(criterion, trial.recording)
     outcome = _judge_mentions(criterion, mentions, trial.recording)
-    elsewhere = _count_misplaced(criterion, mentions)
-    beside = Strays(f"these texts came {elsewhere} times at wrong places", elsewhere)
-    return apply_stray_penalty(outcome, criterion, len(criterion.events), beside)
+    misplaced_count = _count_misplaced(criterion, mentions)
+    strays = Strays(f"these texts came {misplaced_count} times at wrong places", misplaced_count)
+    return apply_stray_penalty(outcome, criterion, len(criterion.events), strays)
 
 
 def _collect_mentions(criterion: Events, recording: Recording) -> list[_Mention]:
     """Return the lines that name texts of events, by time."""
-    printed = recording.printed if criterion.source != "speech" else ()
-    spoken = recording.spoken if criterion.source != "print" else ()
-    lines = sorted({(line.t, line.text): line for line in (*printed, *spoken)}.values(), key=lambda line: line.t)
+    printed_lines = recording.printed if criterion.source != "speech" else ()
+    spoken_lines = recording.spoken if criterion.source != "print" else ()
+    lines = sorted(
+        {(line.t, line.text): line for line in (*printed_lines, *spoken_lines)}.values(), key=lambda line: line.t
+    )
     phrases = {text: _pad_words(text) for event in criterion.events for text in event.text}
     mentions = []
     for line in lines:
-        said = _pad_words(line.text)
-        texts = frozenset(text for text, phrase in phrases.items() if phrase in said)
+        padded_line = _pad_words(line.text)
+        texts = frozenset(text for text, phrase in phrases.items() if phrase in padded_line)
         if texts:
             mentions.append(_Mention(line, texts, locate_part_at_time(recording, criterion.sensor, line.t)))
     return mentions
@@ -235,20 +244,22 @@ def _pad_words(text: str) -> str:
 
 
 def _judge_mentions(criterion: Events, mentions: Sequence[_Mention], recording: Recording) -> Outcome:
-    found: list[_Mention] = []
+    matched_mentions: list[_Mention] = []
     start = 0
     strays = _find_strays(criterion, mentions)
     for event in criterion.events:
         if event in strays:
-            return _fail_for_stray(criterion, event, strays[event], found, recording)
-        place = next((i for i in range(start, len(mentions)) if _is_event(criterion, event, mentions[i])), None)
-        if place is None:
-            return _fail_for_missed_event(criterion, event, found, mentions[start:], recording)
-        found.append(mentions[place])
-        start = place + 1
+            return _fail_for_stray(criterion, event, strays[event], matched_mentions, recording)
+        index = next((i for i in range(start, len(mentions)) if _is_event(criterion, event, mentions[i])), None)
+        if index is None:
+            return _fail_for_missed_event(criterion, event, matched_mentions, mentions[start:], recording)
+        matched_mentions.append(mentions[index])
+        start = index + 1
     names = tuple(event.text[0] for event in criterion.events)
-    measures = tuple(Measure(f"x at {name}", each.place[0], "mm") for name, each in zip(names, found, strict=True))
-    end = found[-1].line.t
+    measures = tuple(
+        Measure(f"x at {name}", each.place[0], "mm") for name, each in zip(names, matched_mentions, strict=True)
+    )
+    end = matched_mentions[-1].line.t
     return pass_with(
         f"{quote_list(names)} came in order, each at its place.", end, get_pose_at(recording, end), measures
     )
@@ -268,14 +279,14 @@ def _is_event(criterion: Events, event: EventAt, mention: _Mention) -> bool:
 
 def _count_misplaced(criterion: Events, mentions: Sequence[_Mention]) -> int:
     """Return how many texts of events came outside all places that they belong to."""
-    own: dict[tuple[str, ...], list[Zone]] = {}
+    zones_by_text: dict[tuple[str, ...], list[Zone]] = {}
     for event in criterion.events:
-        own.setdefault(event.text, []).append(event.zone)
+        zones_by_text.setdefault(event.text, []).append(event.zone)
     return sum(
         not mention.texts.isdisjoint(texts)
         and not any(is_in_zone(mention.place, zone, criterion.margin) for zone in zones)
         for mention in mentions
-        for texts, zones in own.items()
+        for texts, zones in zones_by_text.items()
     )
 
 
@@ -283,18 +294,18 @@ def _find_strays(criterion: Events, mentions: Sequence[_Mention]) -> dict[EventA
     """Return the first mention of each event at the place of an event with different words."""
     strays: dict[EventAt, _Mention] = {}
     for mention in mentions:
-        here = [other for other in criterion.events if _is_at(criterion, other, mention)]
+        local_events = [other for other in criterion.events if _is_at(criterion, other, mention)]
         for event in criterion.events:
             if event in strays or not _has_event_text(mention, event):
                 continue
             # At the place of an event with the same words, the mention is right.
-            if here and all(set(event.text).isdisjoint(other.text) for other in here):
+            if local_events and all(set(event.text).isdisjoint(other.text) for other in local_events):
                 strays[event] = mention
     return strays
 
 
 def _fail_for_stray(
-    criterion: Events, event: EventAt, mention: _Mention, found: Sequence[_Mention], recording: Recording
+    criterion: Events, event: EventAt, mention: _Mention, matched_mentions: Sequence[_Mention], recording: Recording
 ) -> Outcome:
     (x, y), t = mention.place, mention.line.t
     return fail_with(
@@ -303,31 +314,31 @@ def _fail_for_stray(
         "well.",
         t,
         get_pose_at(recording, t),
-        Fraction(len(found), len(criterion.events)),
+        Fraction(len(matched_mentions), len(criterion.events)),
     )
 
 
 def _describe_expected(criterion: Events, event: EventAt) -> str:
-    what = "the robot" if criterion.sensor == "middle" else f"the {criterion.sensor} light sensor"
-    deed = {"speech": "said", "print": "printed", "either": "reported"}[criterion.source]
-    return f"Expected {quote_text(event.text[0])} to be {deed} with {what} at {describe_zone(event.zone)}"
+    part_name = "the robot" if criterion.sensor == "middle" else f"the {criterion.sensor} light sensor"
+    verb = {"speech": "said", "print": "printed", "either": "reported"}[criterion.source]
+    return f"Expected {quote_text(event.text[0])} to be {verb} with {part_name} at {describe_zone(event.zone)}"
 
 
 def _fail_for_missed_event(
     criterion: Events,
     event: EventAt,
-    found: Sequence[_Mention],
-    after: Sequence[_Mention],
+    matched_mentions: Sequence[_Mention],
+    later_mentions: Sequence[_Mention],
     recording: Recording,
 ) -> Outcome:
     expected = _describe_expected(criterion, event)
-    score = Fraction(len(found), len(criterion.events))
-    elsewhere = next((mention for mention in after if _has_event_text(mention, event)), None)
-    if elsewhere is None:
-        last = found[-1].line if found else None
-        behind = f" after {quote_text(last.text)}" if last else ""
-        t = last.t if last else None
+    score = Fraction(len(matched_mentions), len(criterion.events))
+    misplaced_mention = next((mention for mention in later_mentions if _has_event_text(mention, event)), None)
+    if misplaced_mention is None:
+        last_line = matched_mentions[-1].line if matched_mentions else None
+        position_clause = f" after {quote_text(last_line.text)}" if last_line else ""
+        t = last_line.t if last_line else None
         pose = None if t is None else get_pose_at(recording, t)
-        return fail_with(f"{expected}, but it did not come{behind}.", t, pose, score)
-    (x, y), t = elsewhere.place, elsewhere.line.t
+        return fail_with(f"{expected}, but it did not come{position_clause}.", t, pose, score)
+    (x, y), t = misplaced_mention.place, misplaced_mention.line.t
     return fail_with(f"{expected}, but the text came at ({x:.1f}, {y:.1f}).", t, get_pose_at(recording, t), score)

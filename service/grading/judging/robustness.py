@@ -30,45 +30,53 @@ _MAX_LISTED_LEVELS = 12
 def judge_robustness(criterion: Robustness, case: Case) -> CriterionResult:
     """Judge the accuracy curve along the swept condition."""
 
-    def judged(trials: IndexedTrials) -> CriterionResult:
+    def judge_trials(trials: IndexedTrials) -> CriterionResult:
         levels = find_levels(criterion.along, dict(trials))
-        swept = {index: trial for index, trial in trials if index in levels}
-        found = classify(criterion, case.assignment, list(swept.items()))
-        curve = compute_curve(criterion.along, found.samples, swept)
-        others = (other for other in compute_curves(found.samples, swept) if other.along != criterion.along)
-        curves = (replace(curve, asked=criterion.level), *others)
+        swept_trials = {index: trial for index, trial in trials if index in levels}
+        classification = classify(criterion, case.assignment, list(swept_trials.items()))
+        curve = compute_curve(criterion.along, classification.samples, swept_trials)
+        other_curves = (
+            other for other in compute_curves(classification.samples, swept_trials) if other.along != criterion.along
+        )
+        curves = (replace(curve, asked=criterion.level), *other_curves)
         share = _compute_share(criterion, curve)
         share = round_to_steps(share) if has_hidden(trials) else share
-        return build_recognition_result(criterion, found, share, _describe_curve(criterion, curve), curves, swept)
+        return build_recognition_result(
+            criterion, classification, share, _describe_curve(criterion, curve), curves, swept_trials
+        )
 
-    return judge_pooled(case.list_trials(criterion), judged)
+    return judge_pooled(case.list_trials(criterion), judge_trials)
 
 
 def _compute_share(criterion: Robustness, curve: AccuracyCurve) -> Fraction:
     """Return the fraction of the marks for the curve."""
-    reached = (
+    score = (
         compute_area(curve.levels) if criterion.level is None else compute_share_above(curve.levels, criterion.level)
     )
     if criterion.at_least is None:
-        return reached
-    enough = Fraction(str(criterion.at_least))
-    if reached >= enough:
+        return score
+    required_score = Fraction(str(criterion.at_least))
+    if score >= required_score:
         return Fraction(1)
-    return Fraction(0) if criterion.over == "all" else reached / enough
+    return Fraction(0) if criterion.over == "all" else score / required_score
 
 
 def _describe_curve(criterion: Robustness, curve: AccuracyCurve) -> str:
-    about = CONDITIONS[criterion.along]
+    condition = CONDITIONS[criterion.along]
     levels = curve.levels
     if not levels:
-        return f" No trial was swept over {about.words}."
-    each = ", ".join(f"{level.value:.2f} at {level.at:g}" for level in levels[:_MAX_LISTED_LEVELS])
-    more = ", ..." if len(levels) > _MAX_LISTED_LEVELS else ""
-    words = f" By {about.words} ({about.unit}): {each}{more}."
+        return f" No trial was swept over {condition.words}."
+    values_text = ", ".join(f"{level.value:.2f} at {level.at:g}" for level in levels[:_MAX_LISTED_LEVELS])
+    ellipsis = ", ..." if len(levels) > _MAX_LISTED_LEVELS else ""
+    text = f" By {condition.words} ({condition.unit}): {values_text}{ellipsis}."
     if criterion.level is None:
-        return f"{words} Mean over the sweep: {float(compute_area(levels)):.2f}."
-    held = find_range_above(levels, criterion.level)
-    if held is None:
-        return f"{words} It is below {criterion.level:g} even at the easiest level."
-    where = f"only at {held[0].at:g}" if held[0].at == held[1].at else f"from {held[0].at:g} to {held[1].at:g}"
-    return f"{words} It is at least {criterion.level:g} {where} {about.unit}."
+        return f"{text} Mean over the sweep: {float(compute_area(levels)):.2f}."
+    level_range = find_range_above(levels, criterion.level)
+    if level_range is None:
+        return f"{text} It is below {criterion.level:g} even at the easiest level."
+    range_text = (
+        f"only at {level_range[0].at:g}"
+        if level_range[0].at == level_range[1].at
+        else f"from {level_range[0].at:g} to {level_range[1].at:g}"
+    )
+    return f"{text} It is at least {criterion.level:g} {range_text} {condition.unit}."

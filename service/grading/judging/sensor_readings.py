@@ -23,25 +23,25 @@ INSTRUMENTS: tuple[Instrument, ...] = get_args(Instrument)
 
 
 def match_readings(
-    values: Sequence[float], at: Sequence[float], instruments: Sequence[Instrument], recording: Recording
+    values: Sequence[float], times: Sequence[float], instruments: Sequence[Instrument], recording: Recording
 ) -> NDArray[np.bool_]:
     """Return whether an instrument read each value in the half second before its time, shape (len(values),).
 
     Units: light 0..255 and 0..100, for each colour and for all three together; distance in mm, cm and inches; turning
     in degrees. There are no readings before the first tick.
     """
-    found = np.zeros(len(values), dtype=bool)
+    is_read = np.zeros(len(values), dtype=bool)
     if not len(recording.ticks) or not len(values):
-        return found
+        return is_read
     numbers = np.asarray(values, dtype=np.float64)
-    last = np.clip([count_ticks_until(recording, t) for t in at], 1, len(recording.ticks))
-    first = np.clip([int((t - _MAX_AGE_SECONDS) * recording.ticks.per_second) for t in at], 1, last)
+    last_ticks = np.clip([count_ticks_until(recording, t) for t in times], 1, len(recording.ticks))
+    first_ticks = np.clip([int((t - _MAX_AGE_SECONDS) * recording.ticks.per_second) for t in times], 1, last_ticks)
     columns = np.column_stack([column for each in instruments for column in _collect_reading_columns(each, recording)])
-    for back in range(int(np.max(last - first)) + 1):
-        rows = np.maximum(last - back, first) - 1
+    for offset in range(int(np.max(last_ticks - first_ticks)) + 1):
+        rows = np.maximum(last_ticks - offset, first_ticks) - 1
         for column in columns.T:
-            found |= np.abs(column[rows] - numbers) <= _ROUNDING
-    return found
+            is_read |= np.abs(column[rows] - numbers) <= _ROUNDING
+    return is_read
 
 
 def _collect_reading_columns(instrument: Instrument, recording: Recording) -> list[Floats]:

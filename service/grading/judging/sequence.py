@@ -27,67 +27,77 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
     recording = trial.recording
     lines = recording.spoken if criterion.source == "speech" else recording.printed
     verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
-    wanted = [[split_words(text) for text in texts] for texts in criterion.words]
-    heard = [(word, line) for line in lines for word in split_words(line.text)]
-    if not heard:
+    expected_words = [[split_words(text) for text in texts] for texts in criterion.words]
+    timed_words = [(word, line) for line in lines for word in split_words(line.text)]
+    if not timed_words:
         return fail_with(f"Expected the robot to {verb} {_format_words(criterion)}, but it {past} nothing.")
-    words = [word for word, _ in heard]
-    begin, found, end = _find_best_run(criterion, wanted, words)
-    outcome = _judge_best_run(criterion, recording, heard, found, end)
-    asked = {word for alternatives in wanted for each in alternatives for word in each}
-    again = sum(word in asked for word in (*words[:begin], *words[end:]))
+    words = [word for word, _ in timed_words]
+    start, found_count, end = _find_best_run(criterion, expected_words, words)
+    outcome = _judge_best_run(criterion, recording, timed_words, found_count, end)
+    counted_words = {word for alternatives in expected_words for each in alternatives for word in each}
+    repeat_count = sum(word in counted_words for word in (*words[:start], *words[end:]))
     return apply_stray_penalty(
-        outcome, criterion, len(wanted), Strays(f"it {past} these words {again} more times", again)
+        outcome,
+        criterion,
+        len(expected_words),
+        Strays(f"it {past} these words {repeat_count} more times", repeat_count),
     )
 
 
 def _judge_best_run(
-    criterion: WordSequence, recording: Recording, heard: Sequence[tuple[str, TimedText]], found: int, end: int
+    criterion: WordSequence,
+    recording: Recording,
+    timed_words: Sequence[tuple[str, TimedText]],
+    found_count: int,
+    end: int,
 ) -> Outcome:
-    """Return the outcome of the best run: ``found`` words came, and ``end`` is the place of the next word."""
+    """Return the outcome of the best run: ``found_count`` words came, and ``end`` is the place of the next word."""
     lines = recording.spoken if criterion.source == "speech" else recording.printed
     verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
-    count, shown = len(criterion.words), _format_words(criterion)
-    first = heard[end - 1][1] if found else heard[0][1]
-    if found < count:
-        instead = f"came {quote_text(heard[end][0])}" if end < len(heard) else "came nothing"
-        after = (
-            f"after {_format_alternatives(criterion.words[found - 1])} {instead}"
-            if found
-            else f"it began with {quote_text(heard[0][0])}"
+    count, expected_text = len(criterion.words), _format_words(criterion)
+    reference_line = timed_words[end - 1][1] if found_count else timed_words[0][1]
+    if found_count < count:
+        next_clause = f"came {quote_text(timed_words[end][0])}" if end < len(timed_words) else "came nothing"
+        problem = (
+            f"after {_format_alternatives(criterion.words[found_count - 1])} {next_clause}"
+            if found_count
+            else f"it began with {quote_text(timed_words[0][0])}"
         )
         return fail_with(
-            f"Expected the robot to {verb} {shown}, but {after} instead of "
-            f"{_format_alternatives(criterion.words[found])} "
-            f"({found} of {count} in order).",
-            first.t,
-            get_pose_at(recording, first.t),
-            Fraction(found, count),
+            f"Expected the robot to {verb} {expected_text}, but {problem} instead of "
+            f"{_format_alternatives(criterion.words[found_count])} "
+            f"({found_count} of {count} in order).",
+            reference_line.t,
+            get_pose_at(recording, reference_line.t),
+            Fraction(found_count, count),
         )
-    if end < len(heard) and not criterion.more:
-        word, line = heard[end]
+    if end < len(timed_words) and not criterion.more:
+        word, line = timed_words[end]
         return fail_with(
-            f"Expected the robot to {verb} {shown} and nothing after it, but it {past} {quote_text(word)} as well.",
+            f"Expected the robot to {verb} {expected_text} and nothing after it, but it {past} {quote_text(word)} "
+            "as well.",
             line.t,
             get_pose_at(recording, line.t),
-            Fraction(count, count + len(heard) - end),
+            Fraction(count, count + len(timed_words) - end),
         )
-    hurried = _find_hurried_line(lines) if criterion.waits else None
-    if hurried is not None:
+    hurried_line = _find_hurried_line(lines) if criterion.waits else None
+    if hurried_line is not None:
         return fail_with(
-            f"Expected the robot to wait until each word is spoken, but it said {quote_text(hurried.text)} while "
+            f"Expected the robot to wait until each word is spoken, but it said {quote_text(hurried_line.text)} while "
             "it was "
             "still speaking.",
-            hurried.t,
-            get_pose_at(recording, hurried.t),
+            hurried_line.t,
+            get_pose_at(recording, hurried_line.t),
             Fraction(1, 2),
         )
-    measures = (Measure("words", float(count)), Measure("last at", first.t, "s"))
-    return pass_with(f"The robot {past} {shown}.", first.t, get_pose_at(recording, first.t), measures)
+    measures = (Measure("words", float(count)), Measure("last at", reference_line.t, "s"))
+    return pass_with(
+        f"The robot {past} {expected_text}.", reference_line.t, get_pose_at(recording, reference_line.t), measures
+    )
 
 
 def _find_best_run(
-    criterion: WordSequence, wanted: Sequence[Sequence[list[str]]], words: list[str]
+    criterion: WordSequence, expected_words: Sequence[Sequence[list[str]]], words: list[str]
 ) -> tuple[int, int, int]:
     """Return the start of the best run, how many wanted words it has, and the place of the next word.
 
@@ -95,35 +105,38 @@ def _find_best_run(
     with the longest text from start to end wins.
     """
 
-    def worth(run: tuple[int, int, int]) -> tuple[int, int]:
-        begin, found, end = run
-        return found, end - begin if criterion.more or found < len(wanted) else end
+    def rank_run(run: tuple[int, int, int]) -> tuple[int, int]:
+        start, found_count, end = run
+        return found_count, end - start if criterion.more or found_count < len(expected_words) else end
 
     starts = range(len(words)) if criterion.lead_in else range(1)
     runs = (
-        (start, found, end) for start in starts for found, ends in [_measure_run(wanted, words, start)] for end in ends
+        (start, found, end)
+        for start in starts
+        for found, ends in [_measure_run(expected_words, words, start)]
+        for end in ends
     )
-    return max(runs, key=worth)
+    return max(runs, key=rank_run)
 
 
-def _measure_run(wanted: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, list[int]]:
+def _measure_run(expected_words: Sequence[Sequence[list[str]]], words: list[str], start: int) -> tuple[int, list[int]]:
     """Return how many wanted words follow without a gap from ``start``, and the possible places of the next word."""
     places = [start]
-    for count, alternatives in enumerate(wanted):
-        after = {
+    for count, alternatives in enumerate(expected_words):
+        ends = {
             place + len(each) for place in places for each in alternatives if words[place : place + len(each)] == each
         }
-        if not after:
+        if not ends:
             return count, places
-        places = sorted(after)
-    return len(wanted), places
+        places = sorted(ends)
+    return len(expected_words), places
 
 
 def _find_hurried_line(lines: Sequence[TimedText]) -> TimedText | None:
     """Return the first text that was said before the previous one had been spoken to its end, or None."""
-    for until, after in zip(compute_speech_ends(lines), lines[1:], strict=False):
-        if after.t < until - _SPEECH_ROUNDING:
-            return after
+    for speech_end, following in zip(compute_speech_ends(lines), lines[1:], strict=False):
+        if following.t < speech_end - _SPEECH_ROUNDING:
+            return following
     return None
 
 

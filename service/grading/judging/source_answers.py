@@ -45,29 +45,29 @@ class SourceAnswers:
     unread: str = ""
 
     @classmethod
-    def read(cls, told: Any, criterion: SourceRules) -> SourceAnswers:
+    def read(cls, result: Any, criterion: SourceRules) -> SourceAnswers:
         """Parse the result of the sandboxed reader. Its form is not trusted."""
         try:
-            name, why, line = told["unread"] or ("", "", None)
-            where = f" (line {int(line)})" if line is not None else ""
+            name, reason, line = result["unread"] or ("", "", None)
+            line_clause = f" (line {int(line)})" if line is not None else ""
             answers = (
-                _parse_places(told["uses"], criterion.uses),
-                _parse_places(told["avoids"], criterion.avoids),
-                _parse_places(told["in_loop"], criterion.in_loop),
-                _parse_places(told["defines"], criterion.defines),
-                _parse_places(told["shown"], SPEECH),
+                _parse_places(result["uses"], criterion.uses),
+                _parse_places(result["avoids"], criterion.avoids),
+                _parse_places(result["in_loop"], criterion.in_loop),
+                _parse_places(result["defines"], criterion.defines),
+                _parse_places(result["shown"], SPEECH),
             )
-            doubts = tuple(f"{_parse_place(file, line)} has {str(what)[:80]}" for file, line, what in told["doubts"])
+            doubts = tuple(f"{_parse_place(file, line)} has {str(what)[:80]}" for file, line, what in result["doubts"])
         except (LookupError, TypeError, ValueError, OverflowError):
             return cls(error=_UNREADABLE_SOURCE)
-        if why and not name:
-            return cls(error=f"{str(why)[:200]}{where}")
-        return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(why)[:200]}" if name else "")
+        if reason and not name:
+            return cls(error=f"{str(reason)[:200]}{line_clause}")
+        return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(reason)[:200]}" if name else "")
 
 
-def _parse_places(told: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
+def _parse_places(positions: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:
     """Parse the places of each rule. Raises a standard Python exception if the data is malformed."""
-    return tuple(None if place is None else _parse_place(*place) for _, place in zip(rules, told, strict=True))
+    return tuple(None if place is None else _parse_place(*place) for _, place in zip(rules, positions, strict=True))
 
 
 def _parse_place(file: Any, line: Any) -> MentionPlace:

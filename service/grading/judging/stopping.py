@@ -35,66 +35,74 @@ def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = find_ending_fault(recording)
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
-        wanted, end_t = _describe_expected(criterion), recording.end_t
-        message = f"Expected the robot to stop {wanted}, but its program was still running after {end_t:.2f} s."
+        expectation, end_t = _describe_expected(criterion), recording.end_t
+        message = f"Expected the robot to stop {expectation}, but its program was still running after {end_t:.2f} s."
         return replace(fail_with(message, end_t, recording.end), has_end_reason=fault.verdict is Verdict.TIME_LIMIT)
     if not len(recording.ticks):
         return fail_with(
             f"Expected the robot to stop {_describe_expected(criterion)}, but it never moved: no time passed."
         )
     sides: tuple[Side, ...] = ("left", "right") if criterion.sensor == "either" else (criterion.sensor,)
-    tried = [_judge_side(criterion, side, recording) for side in sides]
-    return max(tried, key=lambda outcome: outcome.score)
+    outcomes = [_judge_side(criterion, side, recording) for side in sides]
+    return max(outcomes, key=lambda outcome: outcome.score)
 
 
 def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
-    place = locate_part(recording, side, recording.end)
+    position = locate_part(recording, side, recording.end)
     rgb = (recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb)[-1]
-    reflected = 100 * int(rgb[0]) / 255
+    reading = 100 * int(rgb[0]) / 255
     checks: list[tuple[bool, str, str]] = []  # whether it holds, the expected value, the actual value
-    where = f"at ({place[0]:.1f}, {place[1]:.1f})"
+    position_text = f"at ({position[0]:.1f}, {position[1]:.1f})"
     # Everything off the floor is black, so the reading covers only the floor.
-    floor = 1.0 if criterion.off_floor else measure_floor_share(recording, side, recording.end)
-    beside = "" if floor == 1 else ", partly beside the floor" if floor else ", beside the floor"
+    floor_share = 1.0 if criterion.off_floor else measure_floor_share(recording, side, recording.end)
+    floor_note = "" if floor_share == 1 else ", partly beside the floor" if floor_share else ", beside the floor"
     if criterion.zone is not None:
-        checks.append((is_in_zone(place, criterion.zone), f"at {describe_zone(criterion.zone)}", where))
+        checks.append((is_in_zone(position, criterion.zone), f"at {describe_zone(criterion.zone)}", position_text))
     if criterion.near is not None:
-        away = math.dist(place, criterion.near)
+        distance = math.dist(position, criterion.near)
         x, y = criterion.near
-        wanted = f"within {criterion.within:g} mm of ({x:g}, {y:g})"
-        checks.append((away <= criterion.within, wanted, f"{where}, {away:.1f} mm away"))
+        expectation = f"within {criterion.within:g} mm of ({x:g}, {y:g})"
+        checks.append((distance <= criterion.within, expectation, f"{position_text}, {distance:.1f} mm away"))
     if criterion.reflected is not None:
-        least, most = criterion.reflected
-        reads = floor > 0 and least <= reflected / floor <= most
-        checks.append((reads, f"reading {_format_range(least, most)} %", f"reading {reflected:.2f} %{beside}"))
-    if criterion.rgb is not None:
-        close = floor > 0 and all(
-            abs(a / floor - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True)
+        minimum, maximum = criterion.reflected
+        is_reading_right = floor_share > 0 and minimum <= reading / floor_share <= maximum
+        checks.append(
+            (is_reading_right, f"reading {_format_range(minimum, maximum)} %", f"reading {reading:.2f} %{floor_note}")
         )
-        seen = ", ".join(str(int(part)) for part in rgb)
+    if criterion.rgb is not None:
+        is_close = floor_share > 0 and all(
+            abs(a / floor_share - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True)
+        )
+        actual_colour = ", ".join(str(int(part)) for part in rgb)
         colour = ", ".join(f"{part:g}" for part in criterion.rgb)
-        checks.append((close, f"over the colour ({colour})", f"over ({seen}){beside}"))
+        checks.append((is_close, f"over the colour ({colour})", f"over ({actual_colour}){floor_note}"))
     if criterion.still:
-        stood = _measure_still_seconds(recording)
-        checks.append((stood >= criterion.still, f"standing for {criterion.still:g} s", f"standing for {stood:.2f} s"))
+        still_seconds = _measure_still_seconds(recording)
+        checks.append(
+            (
+                still_seconds >= criterion.still,
+                f"standing for {criterion.still:g} s",
+                f"standing for {still_seconds:.2f} s",
+            )
+        )
     measures = (
         Measure("end x", recording.end.x, "mm"),
         Measure("end y", recording.end.y, "mm"),
-        Measure("sensor x", place[0], "mm"),
-        Measure("sensor y", place[1], "mm"),
-        Measure("reading", reflected, "%"),
+        Measure("sensor x", position[0], "mm"),
+        Measure("sensor y", position[1], "mm"),
+        Measure("reading", reading, "%"),
         Measure("time", recording.end_t, "s"),
     )
-    wrong = next(((wanted, found) for holds, wanted, found in checks if not holds), None)
-    if wrong is None:
+    problem = next(((wanted, found) for holds, wanted, found in checks if not holds), None)
+    if problem is None:
         return pass_with(
-            f"The robot stopped with its {side} sensor {where}, reading {reflected:.2f} %.",
+            f"The robot stopped with its {side} sensor {position_text}, reading {reading:.2f} %.",
             recording.end_t,
             recording.end,
             measures,
         )
     return fail_with(
-        f"Expected the robot to stop with its {side} sensor {wrong[0]}, but the sensor was {wrong[1]}.",
+        f"Expected the robot to stop with its {side} sensor {problem[0]}, but the sensor was {problem[1]}.",
         recording.end_t,
         recording.end,
         Fraction(sum(holds for holds, _, _ in checks), len(checks)),
@@ -104,9 +112,9 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
 
 def _measure_still_seconds(recording: Recording) -> float:
     """Return the seconds before the end in which the robot neither drove nor turned."""
-    moved = np.flatnonzero(~compute_still_mask(recording))
+    moving_ticks = np.flatnonzero(~compute_still_mask(recording))
     ticks = len(recording.ticks)
-    return tick_to_seconds(recording, ticks - 1 - int(moved[-1]) if len(moved) else ticks)
+    return tick_to_seconds(recording, ticks - 1 - int(moving_ticks[-1]) if len(moving_ticks) else ticks)
 
 
 def _describe_expected(criterion: StopOn) -> str:
@@ -117,5 +125,5 @@ def _describe_expected(criterion: StopOn) -> str:
     )
 
 
-def _format_range(least: float, most: float) -> str:
-    return f"{least:g}" if least == most else f"{least:g} to {most:g}"
+def _format_range(minimum: float, maximum: float) -> str:
+    return f"{minimum:g}" if minimum == maximum else f"{minimum:g} to {maximum:g}"

@@ -29,9 +29,9 @@ class Strays:
         return self.misplaced + Fraction(self.others, _OTHERS_PER_ITEM)
 
 
-def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, wanted: int, strays: Strays) -> Outcome:
-    """Reduce the outcome for ``wanted`` items: strays beyond the allowed number count like additional missing items."""
-    excess = strays.weight - (wanted if criterion.strays is None else criterion.strays)
+def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, count: int, strays: Strays) -> Outcome:
+    """Reduce the outcome for ``count`` items: strays beyond the allowed number count like additional missing items."""
+    excess = strays.weight - (count if criterion.strays is None else criterion.strays)
     if excess <= 0:
         return outcome
     return fail_with(
@@ -39,7 +39,7 @@ def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, wanted
         "possible one.",
         outcome.t,
         outcome.pose,
-        outcome.score * wanted / (wanted + excess),
+        outcome.score * count / (count + excess),
         outcome.measures,
         outcome.for_staff,
     )

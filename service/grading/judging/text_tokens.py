@@ -47,8 +47,8 @@ _TOKEN = re.compile(r"(?P<number>(?<![\w.])[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE
 def split_words(text: str) -> list[str]:
     """Return the words in order, without case and punctuation; "ten" is "10", "one hundred" is "100"."""
     words = [_NUMBERS.get(word, word) for word in _WORD.findall(text[:_MAX_CHARACTERS].casefold())]
-    joined = [word for word, after in pairwise([*words, ""]) if not (word in ("1", "a") and after == "100")]
-    return joined
+    merged_words = [word for word, after in pairwise([*words, ""]) if not (word in ("1", "a") and after == "100")]
+    return merged_words
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +61,19 @@ class Token:
 
 def tokenize_text(text: str) -> list[Token]:
     """Return the words and numbers in order, with numbers in Python's notation."""
-    found = []
+    tokens = []
     for match in _TOKEN.finditer(text[:_MAX_CHARACTERS].casefold()):
         word = _NUMBERS.get(match[0], match[0])
-        found.append(Token(word, float(word) if match["number"] or word.isdecimal() else None))
-    return found
+        tokens.append(Token(word, float(word) if match["number"] or word.isdecimal() else None))
+    return tokens
 
 
-def find_words(words: Sequence[str], wanted: Sequence[str], start: int = 0) -> int | None:
-    """Return the first place from ``start`` on that matches all of ``wanted``, or None."""
-    wanted = list(wanted)
-    for place in range(start, len(words) - len(wanted) + 1):
-        if list(words[place : place + len(wanted)]) == wanted:
-            return place
+def find_words(words: Sequence[str], phrase: Sequence[str], start: int = 0) -> int | None:
+    """Return the first place from ``start`` on that matches all of ``phrase``, or None."""
+    phrase = list(phrase)
+    for index in range(start, len(words) - len(phrase) + 1):
+        if list(words[index : index + len(phrase)]) == phrase:
+            return index
     return None
 
 
@@ -81,8 +81,8 @@ def compute_speech_ends(lines: Sequence[TimedText]) -> list[float]:
     """Return the end time of each utterance, in seconds: they queue up, at 130 words a minute."""
     ends: list[float] = []
     for line in lines:
-        begin = max(line.t, ends[-1] if ends else 0.0)
-        ends.append(begin + len(line.text.split()) * 60 / 130)
+        start = max(line.t, ends[-1] if ends else 0.0)
+        ends.append(start + len(line.text.split()) * 60 / 130)
     return ends
 
 
@@ -93,8 +93,8 @@ class LabelFinder:
         self._names: dict[str, str] = {}
         for label in labels:
             self._names[_normalise_spelling(label)] = label
-        for label, others in aliases.items():
-            for name in (label, *others):
+        for label, alias_names in aliases.items():
+            for name in (label, *alias_names):
                 self._names.setdefault(_normalise_spelling(name), self.to_canonical(label))
         longest_first = sorted((name for name in self._names if name), key=len, reverse=True)
         alternatives = "|".join(map(re.escape, longest_first))
@@ -108,8 +108,8 @@ class LabelFinder:
         """Return the different labels in a text, in order."""
         if self._pattern is None:
             return []
-        found = self._pattern.findall(_normalise_spelling(text[:_MAX_ANSWER_CHARACTERS]))
-        return list(dict.fromkeys(self._names[name] for name in found))
+        matches = self._pattern.findall(_normalise_spelling(text[:_MAX_ANSWER_CHARACTERS]))
+        return list(dict.fromkeys(self._names[name] for name in matches))
 
 
 def _normalise_spelling(text: str) -> str:

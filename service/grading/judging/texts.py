@@ -81,41 +81,52 @@ def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
     recording = trial.recording
     if not criterion.queue_grows:
         return _judge_texts(criterion, recording)
-    grown = _judge_queue_growth(recording)
-    counted = (criterion.at_least, criterion.at_most, criterion.exactly) != (None, None, None)
-    if not (criterion.has_conditions or criterion.in_order or counted):
-        return grown
-    texts = _judge_texts(criterion, recording)
-    worse = texts if grown.passed else grown
-    return Outcome(worse.passed, min(texts.score, grown.score), worse.message, worse.t, worse.pose)
+    growth_outcome = _judge_queue_growth(recording)
+    has_count = (criterion.at_least, criterion.at_most, criterion.exactly) != (None, None, None)
+    if not (criterion.has_conditions or criterion.in_order or has_count):
+        return growth_outcome
+    text_outcome = _judge_texts(criterion, recording)
+    worse_outcome = text_outcome if growth_outcome.passed else growth_outcome
+    return Outcome(
+        worse_outcome.passed,
+        min(text_outcome.score, growth_outcome.score),
+        worse_outcome.message,
+        worse_outcome.t,
+        worse_outcome.pose,
+    )
 
 
 def judge_sequence(
-    criterion: TextSequence, lines: Sequence[TimedText], deed: TextWording, recording: Recording
+    criterion: TextSequence, lines: Sequence[TimedText], wording: TextWording, recording: Recording
 ) -> Outcome:
     """Judge whether the right texts are among ``lines``. Repeated spaces count as one."""
     if criterion.last:
-        return _judge_last(criterion, lines, deed, recording)
-    chosen = [line for line in lines if is_accepted_text(criterion, line.text)]
+        return _judge_last(criterion, lines, wording, recording)
+    accepted_lines = [line for line in lines if is_accepted_text(criterion, line.text)]
     if criterion.in_order:
-        outcome, found = _judge_order(criterion, chosen, lines, deed, recording)
-        beside = _find_misplaced_lines(criterion, chosen, found, deed)
-        return apply_stray_penalty(outcome, criterion, len(criterion.in_order), beside)
-    outcome = _judge_count(criterion, chosen, lines, deed, recording)
+        outcome, matched_lines = _judge_order(criterion, accepted_lines, lines, wording, recording)
+        strays = _find_misplaced_lines(criterion, accepted_lines, matched_lines, wording)
+        return apply_stray_penalty(outcome, criterion, len(criterion.in_order), strays)
+    outcome = _judge_count(criterion, accepted_lines, lines, wording, recording)
     return apply_stray_penalty(
-        outcome, criterion, max(_find_count_bounds(criterion)[0], 1), _find_extra_lines(criterion, lines, chosen, deed)
+        outcome,
+        criterion,
+        max(_find_count_bounds(criterion)[0], 1),
+        _find_extra_lines(criterion, lines, accepted_lines, wording),
     )
 
 
 def is_accepted_text(criterion: TextConditions, text: str) -> bool:
     """Return whether a text meets all given conditions."""
     fold = criterion.ignore_case
-    plain = _normalise_text(text, fold)
-    if criterion.equals and plain not in [_normalise_text(wanted, fold) for wanted in criterion.equals]:
+    normalised = _normalise_text(text, fold)
+    if criterion.equals and normalised not in [_normalise_text(wanted, fold) for wanted in criterion.equals]:
         return False
-    if criterion.starts_with and not plain.startswith(tuple(_normalise_text(w, fold) for w in criterion.starts_with)):
+    if criterion.starts_with and not normalised.startswith(
+        tuple(_normalise_text(w, fold) for w in criterion.starts_with)
+    ):
         return False
-    if not all(_normalise_text(wanted, fold) in plain for wanted in criterion.contains):
+    if not all(_normalise_text(wanted, fold) in normalised for wanted in criterion.contains):
         return False
     if criterion.among and len(_find_named_choices(criterion.among, text)) != 1:
         return False
@@ -124,161 +135,183 @@ def is_accepted_text(criterion: TextConditions, text: str) -> bool:
 
 def describe_conditions(criterion: TextConditions) -> str:
     """Return the conditions in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
-    others = criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
-    if criterion.equals and not others:
+    has_other_conditions = (
+        criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
+    )
+    if criterion.equals and not has_other_conditions:
         return quote_list(criterion.equals, "or")
-    words = []
+    clauses = []
     if criterion.equals:
-        words.append(f"is {quote_list(criterion.equals, 'or')}")
+        clauses.append(f"is {quote_list(criterion.equals, 'or')}")
     if criterion.starts_with:
-        words.append(f"starts with {quote_list(criterion.starts_with, 'or')}")
+        clauses.append(f"starts with {quote_list(criterion.starts_with, 'or')}")
     if criterion.contains:
-        words.append(f"contains {quote_list(criterion.contains)}")
+        clauses.append(f"contains {quote_list(criterion.contains)}")
     if criterion.among:
-        words.append(f"names only one of {quote_list(criterion.among)}")
+        clauses.append(f"names only one of {quote_list(criterion.among)}")
     if criterion.matches is not None:
-        words.append(f"matches the pattern {quote_text(criterion.matches)}")
-    return f"{_SOMETHING}{' and '.join(words)}" if words else ""
+        clauses.append(f"matches the pattern {quote_text(criterion.matches)}")
+    return f"{_SOMETHING}{' and '.join(clauses)}" if clauses else ""
 
 
-def is_same_text(text: str, wanted: str, ignore_case: bool) -> bool:
+def is_same_text(text: str, expected: str, ignore_case: bool) -> bool:
     """Return whether two texts are equal apart from blanks at the ends, repeated blanks and, if requested, case."""
-    return _normalise_text(text, ignore_case) == _normalise_text(wanted, ignore_case)
+    return _normalise_text(text, ignore_case) == _normalise_text(expected, ignore_case)
 
 
 def _judge_last(
-    criterion: TextSequence, lines: Sequence[TimedText], deed: TextWording, recording: Recording
+    criterion: TextSequence, lines: Sequence[TimedText], wording: TextWording, recording: Recording
 ) -> Outcome:
-    wanted = describe_conditions(criterion)
+    expected = describe_conditions(criterion)
     if not lines:
         return fail_with(
-            f"Expected the last text that {deed.who} {deed.past} to be {wanted}, but it {deed.past} nothing."
+            f"Expected the last text that {wording.who} {wording.past} to be {expected}, but it {wording.past} nothing."
         )
-    last = lines[-1]
-    pose = get_pose_at(recording, last.t)
-    if is_accepted_text(criterion, last.text):
-        return pass_with(f"The last text that {deed.who} {deed.past} was {quote_text(last.text)}.", last.t, pose)
+    last_line = lines[-1]
+    pose = get_pose_at(recording, last_line.t)
+    if is_accepted_text(criterion, last_line.text):
+        return pass_with(
+            f"The last text that {wording.who} {wording.past} was {quote_text(last_line.text)}.", last_line.t, pose
+        )
     return fail_with(
-        f"Expected the last text that {deed.who} {deed.past} to be {wanted}, but it was {quote_text(last.text)}.",
-        last.t,
+        f"Expected the last text that {wording.who} {wording.past} to be {expected}, but it was "
+        f"{quote_text(last_line.text)}.",
+        last_line.t,
         pose,
     )
 
 
 def _judge_order(
     criterion: TextSequence,
-    chosen: Sequence[TimedText],
+    accepted_lines: Sequence[TimedText],
     lines: Sequence[TimedText],
-    deed: TextWording,
+    wording: TextWording,
     recording: Recording,
 ) -> tuple[Outcome, Sequence[TimedText]]:
     """Return the outcome, and the lines matched to the texts in order."""
-    wanted = criterion.in_order
-    found: list[TimedText] = []
-    extra: TimedText | None = None
-    for line in chosen:
-        if len(found) < len(wanted) and _is_distinct_match(criterion, line.text, wanted[len(found)]):
-            found.append(line)
-        elif extra is None:
-            extra = line
-    expected = f"Expected {deed.who} to {deed.verb} {quote_list(wanted)}{' in this order' if len(wanted) > 1 else ''}"
+    required_texts = criterion.in_order
+    matched_lines: list[TimedText] = []
+    extra_line: TimedText | None = None
+    for line in accepted_lines:
+        if len(matched_lines) < len(required_texts) and _is_distinct_match(
+            criterion, line.text, required_texts[len(matched_lines)]
+        ):
+            matched_lines.append(line)
+        elif extra_line is None:
+            extra_line = line
+    order = " in this order" if len(required_texts) > 1 else ""
+    expected = f"Expected {wording.who} to {wording.verb} {quote_list(required_texts)}{order}"
     if criterion.only:
         expected += " and nothing else"
-        counts = describe_conditions(criterion)
-        expected += f" that {counts.removeprefix(_SOMETHING)}" if counts.startswith(_SOMETHING) else ""
-    extras = len(chosen) - len(found) if criterion.only else 0
-    score = Fraction(len(found), len(wanted) + extras)
-    if criterion.only and extra is not None:
-        words = f"{expected}, but it {deed.past} {quote_text(extra.text)} as well."
-        return fail_with(words, extra.t, get_pose_at(recording, extra.t), score), found
-    if len(found) < len(wanted):
-        missing = quote_text(wanted[len(found)])
-        what = (
-            _describe_actual(chosen or lines, deed)
-            if not found
-            else f"{missing} did not come after {quote_text(found[-1].text)}"
+        conditions = describe_conditions(criterion)
+        expected += f" that {conditions.removeprefix(_SOMETHING)}" if conditions.startswith(_SOMETHING) else ""
+    extra_count = len(accepted_lines) - len(matched_lines) if criterion.only else 0
+    score = Fraction(len(matched_lines), len(required_texts) + extra_count)
+    if criterion.only and extra_line is not None:
+        message = f"{expected}, but it {wording.past} {quote_text(extra_line.text)} as well."
+        return fail_with(message, extra_line.t, get_pose_at(recording, extra_line.t), score), matched_lines
+    if len(matched_lines) < len(required_texts):
+        missing_text = quote_text(required_texts[len(matched_lines)])
+        problem = (
+            _describe_actual(accepted_lines or lines, wording)
+            if not matched_lines
+            else f"{missing_text} did not come after {quote_text(matched_lines[-1].text)}"
         )
-        at = found[-1].t if found else None
-        pose = get_pose_at(recording, at) if at is not None else None
-        return fail_with(f"{expected}, but {what} ({len(found)} of {len(wanted)} found).", at, pose, score), found
-    end = found[-1]
-    words = f"{deed.who.capitalize()} {deed.past} {quote_list(wanted)} in order."
-    return pass_with(words, end.t, get_pose_at(recording, end.t)), found
+        time = matched_lines[-1].t if matched_lines else None
+        pose = get_pose_at(recording, time) if time is not None else None
+        return fail_with(
+            f"{expected}, but {problem} ({len(matched_lines)} of {len(required_texts)} found).", time, pose, score
+        ), matched_lines
+    last_line = matched_lines[-1]
+    message = f"{wording.who.capitalize()} {wording.past} {quote_list(required_texts)} in order."
+    return pass_with(message, last_line.t, get_pose_at(recording, last_line.t)), matched_lines
 
 
-def _is_distinct_match(criterion: TextSequence, text: str, wanted: str) -> bool:
+def _is_distinct_match(criterion: TextSequence, text: str, expected: str) -> bool:
     """Return whether a text matches the wanted one. A text that contains at least half of the others matches none."""
-    if criterion.compare != "contains" or not _is_text_match(criterion, text, wanted):
-        return _is_text_match(criterion, text, wanted)
-    others = {other for other in criterion.in_order if not _is_text_match(criterion, wanted, other)}
-    return not others or 2 * sum(_is_text_match(criterion, text, other) for other in others) < len(others)
+    if criterion.compare != "contains" or not _is_text_match(criterion, text, expected):
+        return _is_text_match(criterion, text, expected)
+    other_texts = {other for other in criterion.in_order if not _is_text_match(criterion, expected, other)}
+    return not other_texts or 2 * sum(_is_text_match(criterion, text, other) for other in other_texts) < len(
+        other_texts
+    )
 
 
 def _find_misplaced_lines(
-    criterion: TextSequence, chosen: Sequence[TimedText], found: Sequence[TimedText], deed: TextWording
+    criterion: TextSequence,
+    accepted_lines: Sequence[TimedText],
+    matched_lines: Sequence[TimedText],
+    wording: TextWording,
 ) -> Strays:
     """Return the strays: other lines that count or match a required text, in addition to those found."""
     if criterion.only:
         # Each additional text has already lowered the score.
         return Strays("")
-    taken = set(map(id, found))
+    matched_ids = set(map(id, matched_lines))
     # A loop that repeats one text does not name everything.
-    changed = [line for place, line in enumerate(chosen) if not place or line.text != chosen[place - 1].text]
-    every = criterion.has_conditions or deed.addressed
-    extra = sum(
-        every or any(_is_text_match(criterion, line.text, text) for text in criterion.in_order)
-        for line in changed
-        if id(line) not in taken
+    distinct_lines = [
+        line for place, line in enumerate(accepted_lines) if not place or line.text != accepted_lines[place - 1].text
+    ]
+    is_any_counted = criterion.has_conditions or wording.addressed
+    misplaced_count = sum(
+        is_any_counted or any(_is_text_match(criterion, line.text, text) for text in criterion.in_order)
+        for line in distinct_lines
+        if id(line) not in matched_ids
     )
-    words = f"such texts were {deed.past} {extra} times at the wrong point"
+    description = f"such texts were {wording.past} {misplaced_count} times at the wrong point"
     # A text that only contains "1" may be about anything.
-    sure = every or criterion.compare == "equals"
-    return Strays(words, misplaced=extra) if sure else Strays(words, others=extra)
+    is_certain = is_any_counted or criterion.compare == "equals"
+    return Strays(description, misplaced=misplaced_count) if is_certain else Strays(description, others=misplaced_count)
 
 
 def _judge_count(
     criterion: TextSequence,
-    chosen: Sequence[TimedText],
+    accepted_lines: Sequence[TimedText],
     lines: Sequence[TimedText],
-    deed: TextWording,
+    wording: TextWording,
     recording: Recording,
 ) -> Outcome:
-    least, most = _find_count_bounds(criterion)
-    what = describe_conditions(criterion) or "something"
-    count = len(chosen)
-    last = chosen[-1] if chosen else None
-    at = last.t if last else None
-    pose = get_pose_at(recording, last.t) if last else None
-    if count >= least and (most is None or count <= most):
-        if last is None:
-            return pass_with(f"{deed.who.capitalize()} {deed.past} no forbidden text.")
-        again = f" ({count} such texts)" if count > 1 else ""
-        return pass_with(f"{deed.who.capitalize()} {deed.past} {quote_text(last.text)}{again}.", at, pose)
-    times = _format_times(least, most)
-    expected = f"Expected {deed.who} to {deed.verb} {what}{times}"
+    minimum, maximum = _find_count_bounds(criterion)
+    conditions = describe_conditions(criterion) or "something"
+    count = len(accepted_lines)
+    last_line = accepted_lines[-1] if accepted_lines else None
+    time = last_line.t if last_line else None
+    pose = get_pose_at(recording, last_line.t) if last_line else None
+    if count >= minimum and (maximum is None or count <= maximum):
+        if last_line is None:
+            return pass_with(f"{wording.who.capitalize()} {wording.past} no forbidden text.")
+        count_clause = f" ({count} such texts)" if count > 1 else ""
+        return pass_with(
+            f"{wording.who.capitalize()} {wording.past} {quote_text(last_line.text)}{count_clause}.", time, pose
+        )
+    times = _format_times(minimum, maximum)
+    expected = f"Expected {wording.who} to {wording.verb} {conditions}{times}"
     if count == 0:
-        return fail_with(f"{expected}, but {_describe_actual(lines, deed)}.")
-    score = Fraction(count, least) if count < least else Fraction(most or 0, count)
+        return fail_with(f"{expected}, but {_describe_actual(lines, wording)}.")
+    score = Fraction(count, minimum) if count < minimum else Fraction(maximum or 0, count)
     return fail_with(
-        f"{expected}, but it {deed.past} {count} such, the last {quote_text(chosen[-1].text)}.", at, pose, score
+        f"{expected}, but it {wording.past} {count} such, the last {quote_text(accepted_lines[-1].text)}.",
+        time,
+        pose,
+        score,
     )
 
 
 def _find_extra_lines(
-    criterion: TextSequence, lines: Sequence[TimedText], chosen: Sequence[TimedText], deed: TextWording
+    criterion: TextSequence, lines: Sequence[TimedText], accepted_lines: Sequence[TimedText], wording: TextWording
 ) -> Strays:
     """Return the strays: lines in addition to the required ones.
 
     Lines that differ only in numbers count once, unless they differ from a required line only in numbers: then each
     counts.
     """
-    if not (chosen and criterion.has_conditions and _find_count_bounds(criterion)[0]):
+    if not (accepted_lines and criterion.has_conditions and _find_count_bounds(criterion)[0]):
         return Strays("")
-    guessed = {_remove_numbers(line.text) for line in chosen}
-    counted = set(map(id, chosen))
-    forms = [_remove_numbers(line.text) for line in lines if id(line) not in counted]
-    others = sum(form in guessed for form in forms) + len(set(forms) - guessed)
-    return Strays(f"it {deed.past} {others} others as well", others=others)
+    accepted_forms = {_remove_numbers(line.text) for line in accepted_lines}
+    accepted_ids = set(map(id, accepted_lines))
+    other_forms = [_remove_numbers(line.text) for line in lines if id(line) not in accepted_ids]
+    extra_count = sum(form in accepted_forms for form in other_forms) + len(set(other_forms) - accepted_forms)
+    return Strays(f"it {wording.past} {extra_count} others as well", others=extra_count)
 
 
 def _remove_numbers(text: str) -> str:
@@ -294,44 +327,52 @@ def _find_count_bounds(criterion: TextSequence) -> tuple[int, int | None]:
     return criterion.at_least or 0, criterion.at_most
 
 
-def _format_times(least: int, most: int | None) -> str:
-    if most is None:
-        return "" if least == 1 else f" at least {least} times"
-    if most == least:
-        return " exactly once" if least == 1 else f" exactly {least} times"
-    return f" at most {most} times" if least == 0 else f" {least} to {most} times"
+def _format_times(minimum: int, maximum: int | None) -> str:
+    if maximum is None:
+        return "" if minimum == 1 else f" at least {minimum} times"
+    if maximum == minimum:
+        return " exactly once" if minimum == 1 else f" exactly {minimum} times"
+    return f" at most {maximum} times" if minimum == 0 else f" {minimum} to {maximum} times"
 
 
-def _describe_actual(lines: Sequence[TimedText], deed: TextWording) -> str:
+def _describe_actual(lines: Sequence[TimedText], wording: TextWording) -> str:
     if not lines:
-        return f"it {deed.past} nothing"
+        return f"it {wording.past} nothing"
     if len(lines) == 1:
-        return f"it {deed.past} {quote_text(lines[0].text)}"
-    return f"it {deed.past} {len(lines)} other texts, the last {quote_text(lines[-1].text)}"
+        return f"it {wording.past} {quote_text(lines[0].text)}"
+    return f"it {wording.past} {len(lines)} other texts, the last {quote_text(lines[-1].text)}"
 
 
 def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
     if not criterion.json_queue:
         pair = build_pair(criterion, recording)
-        sent = [TimedText(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"]
-        deed = (
+        sent_texts = [
+            TimedText(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"
+        ]
+        wording = (
             TextWording(pair.sender_name, f"tell {pair.receiver_name}", f"told {pair.receiver_name}")
             if criterion.agents
             else _SEND
         )
-        return judge_sequence(criterion, sent, deed, recording)
-    arrived = [message for message in recording.messages if _is_queued(message)]
-    as_arrived = [(message.delivered or 0.0, message.received) for message in arrived]
-    outcome = judge_sequence(criterion, _collect_queue_lines(criterion, as_arrived), _RECEIVE, recording)
-    astray = [message for message in recording.messages if message.sender == "responder" and is_lost_by_chance(message)]
-    if outcome.passed or not astray:
+        return judge_sequence(criterion, sent_texts, wording, recording)
+    arrived_messages = [message for message in recording.messages if _is_queued(message)]
+    arrived_texts = [(message.delivered or 0.0, message.received) for message in arrived_messages]
+    outcome = judge_sequence(criterion, _collect_queue_lines(criterion, arrived_texts), _RECEIVE, recording)
+    lost_answers = [
+        message for message in recording.messages if message.sender == "responder" and is_lost_by_chance(message)
+    ]
+    if outcome.passed or not lost_answers:
         return outcome
     # Judge the answers as if there were no random losses, because the program cannot prevent them.
-    as_answered = {id(message): (message.delivered or message.t, message.text) for message in (*arrived, *astray)}
-    excused = judge_sequence(criterion, _collect_queue_lines(criterion, as_answered.values()), _RECEIVE, recording)
-    if excused.score <= outcome.score:
+    answered_texts = {
+        id(message): (message.delivered or message.t, message.text) for message in (*arrived_messages, *lost_answers)
+    }
+    excused_outcome = judge_sequence(
+        criterion, _collect_queue_lines(criterion, answered_texts.values()), _RECEIVE, recording
+    )
+    if excused_outcome.score <= outcome.score:
         return outcome
-    return replace(excused, message=f"{excused.message} {_EXCUSED}")
+    return replace(excused_outcome, message=f"{excused_outcome.message} {_EXCUSED}")
 
 
 def _collect_queue_lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[TimedText]:
@@ -359,35 +400,42 @@ def _judge_queue_growth(recording: Recording) -> Outcome:
 
     Answers that the channel lost by chance, or that came when the message was sent again, are not missed.
     """
-    sent = [
+    sent_messages = [
         (index, message)
         for index, message in enumerate(recording.messages)
         if message.sender == "robot" and message.text.startswith(PY)
     ]
-    asked = [(index, message) for index, message in sent if message.delivered is not None]
+    received_messages = [(index, message) for index, message in sent_messages if message.delivered is not None]
     expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
-    if not asked:
-        astray = next((message for _, message in sent if is_out_of_reach(message)), None)
-        if sent and not astray:
+    if not received_messages:
+        unreachable_message = next((message for _, message in sent_messages if is_out_of_reach(message)), None)
+        if sent_messages and not unreachable_message:
             return pass_with("The channel lost every PY:: message by chance, so there were no answers to queue.")
-        lost = f"the channel lost {quote_text(astray.text)} ({describe_loss(astray)})" if astray else ""
-        return fail_with(f"{expected}, but {lost or 'the robot sent no PY:: message'}.")
+        reason = (
+            f"the channel lost {quote_text(unreachable_message.text)} ({describe_loss(unreachable_message)})"
+            if unreachable_message
+            else ""
+        )
+        return fail_with(f"{expected}, but {reason or 'the robot sent no PY:: message'}.")
     answers = Answers(recording)
-    replies = [(message, _find_reply(answers, index)) for index, message in asked]
+    replies = [(message, _find_reply(answers, index)) for index, message in received_messages]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and _is_queued(reply)]
-    came = {message.text for message, reply in replies if reply is not None and _is_queued(reply)}
+    answered_texts = {message.text for message, reply in replies if reply is not None and _is_queued(reply)}
     # A repeated message shows nothing new.
-    different = {message.text for _, message in asked}
-    missed = [(message, reply) for message, reply in replies if not _is_excused(message, reply, came)]
-    score = Fraction(len(different - {message.text for message, _ in missed}), len(different))
-    for message, reply in missed:
-        happened = "got no answer" if reply is None else f"was answered with {quote_text(reply.text)}"
+    distinct_texts = {message.text for _, message in received_messages}
+    missed_messages = [
+        (message, reply) for message, reply in replies if not _is_excused(message, reply, answered_texts)
+    ]
+    score = Fraction(len(distinct_texts - {message.text for message, _ in missed_messages}), len(distinct_texts))
+    for message, reply in missed_messages:
+        problem = "got no answer" if reply is None else f"was answered with {quote_text(reply.text)}"
         if reply is not None and reply.delivered is None and reply.note == "undelivered":
-            happened = "got its answer only after the program had ended"
+            problem = "got its answer only after the program had ended"
         if reply is not None and is_out_of_reach(reply):
-            happened = f"was answered and the channel lost the answer ({describe_loss(reply)})"
+            problem = f"was answered and the channel lost the answer ({describe_loss(reply)})"
         return fail_with(
-            f"{expected}, but {quote_text(message.text)} {happened} ({len(arrivals)} of {len(asked)} in the queue).",
+            f"{expected}, but {quote_text(message.text)} {problem} ({len(arrivals)} of {len(received_messages)} "
+            "in the queue).",
             message.t,
             get_pose_at(recording, message.t),
             score,
@@ -409,24 +457,24 @@ def _find_reply(answers: Answers, index: int) -> Message | None:
     return next(filter(_is_queued, answers.list_answers(index)), answers.find_answer(index))
 
 
-def _is_excused(message: Message, reply: Message | None, came: Container[str]) -> bool:
+def _is_excused(message: Message, reply: Message | None, answered_texts: Container[str]) -> bool:
     """Return whether a message's answer is in the queue, or missing only because of the channel."""
     if reply is None:
         return False
-    return _is_queued(reply) or is_lost_by_chance(reply) or (is_out_of_reach(reply) and message.text in came)
+    return _is_queued(reply) or is_lost_by_chance(reply) or (is_out_of_reach(reply) and message.text in answered_texts)
 
 
-def _is_text_match(criterion: TextSequence, text: str, wanted: str) -> bool:
+def _is_text_match(criterion: TextSequence, text: str, expected: str) -> bool:
     fold = criterion.ignore_case
     match criterion.compare:
         case "equals":
-            return is_same_text(text, wanted, fold)
+            return is_same_text(text, expected, fold)
         case "contains":
-            return _normalise_text(wanted, fold) in _normalise_text(text, fold)
+            return _normalise_text(expected, fold) in _normalise_text(text, fold)
         case "starts_with":
-            return _normalise_text(text, fold).startswith(_normalise_text(wanted, fold))
+            return _normalise_text(text, fold).startswith(_normalise_text(expected, fold))
         case "matches":
-            return has_match(text, wanted, fold)
+            return has_match(text, expected, fold)
 
 
 def _find_named_choices(choices: Sequence[str], text: str) -> list[str]:
@@ -436,5 +484,5 @@ def _find_named_choices(choices: Sequence[str], text: str) -> list[str]:
 
 
 def _normalise_text(text: str, ignore_case: bool) -> str:
-    plain = " ".join(text.split())
-    return plain.casefold() if ignore_case else plain
+    normalised = " ".join(text.split())
+    return normalised.casefold() if ignore_case else normalised

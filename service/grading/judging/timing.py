@@ -24,13 +24,14 @@ _STILL = 1e-6  # mm or degrees per tick
 def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
     """Judge the duration in simulated seconds. The bounds are included."""
     recording = trial.recording
-    seconds, what = _measure_seconds(criterion, recording)
-    least, most = criterion.between
+    seconds, activity = _measure_seconds(criterion, recording)
+    minimum, maximum = criterion.between
     measures = (Measure("time", seconds, "s"),)
-    if least - 1e-9 <= seconds <= most + 1e-9:
-        return pass_with(f"{what} took {seconds:.2f} s.", recording.end_t, recording.end, measures)
+    if minimum - 1e-9 <= seconds <= maximum + 1e-9:
+        return pass_with(f"{activity} took {seconds:.2f} s.", recording.end_t, recording.end, measures)
     return fail_with(
-        f"Expected {what[0].lower()}{what[1:]} to take from {least:g} to {most:g} s, but it took {seconds:.2f} s.",
+        f"Expected {activity[0].lower()}{activity[1:]} to take from {minimum:g} to {maximum:g} s, but it took "
+        f"{seconds:.2f} s.",
         recording.end_t,
         recording.end,
         measures=measures,
@@ -40,31 +41,34 @@ def judge_timing(criterion: Timing, trial: TrialResult) -> Outcome:
 @declare_case_judge(Ranking)
 def judge_ranking(criterion: Ranking, case: Case) -> CriterionResult:
     """Judge the value that another criterion measured in each trial."""
-    other = case.results.get(criterion.of)
-    return judge_by_trial(criterion, case, lambda index, _: _judge_rank(criterion, index, other))
+    ranked_result = case.results.get(criterion.of)
+    return judge_by_trial(criterion, case, lambda index, _: _judge_rank(criterion, index, ranked_result))
 
 
-def _judge_rank(criterion: Ranking, place: int, other: CriterionResult | None) -> Outcome:
-    """Return the outcome for the value of trial ``place``; no marks if the other criterion failed."""
-    evidence = next((each for each in other.evidence if each.trial == place), None) if other else None
+def _judge_rank(criterion: Ranking, trial_index: int, ranked_result: CriterionResult | None) -> Outcome:
+    """Return the outcome for the value of trial ``trial_index``; no marks if the other criterion failed."""
+    evidence = (
+        next((each for each in ranked_result.evidence if each.trial == trial_index), None) if ranked_result else None
+    )
     measure = _find_measure(criterion, evidence)
     if evidence is None or measure is None:
         return fail_with(f"Expected a {criterion.measure}, but none was measured.")
     unit = f" {measure.unit}" if measure.unit else ""
-    found = f"{criterion.measure}: {measure.value:.2f}{unit}"
+    value_text = f"{criterion.measure}: {measure.value:.2f}{unit}"
     if not evidence.passed:
         # Values that don't count are left out of the ranking.
-        return fail_with(f"The {found} does not count: {evidence.message}", evidence.t, evidence.pose)
+        return fail_with(f"The {value_text} does not count: {evidence.message}", evidence.t, evidence.pose)
     share = _compute_share(criterion, measure.value)
     best = criterion.steps[0][0]
     if share == 1:
-        return pass_with(f"The {found}.", evidence.t, evidence.pose, (measure,))
-    bound = "at least" if criterion.highest else "at most"
+        return pass_with(f"The {value_text}.", evidence.t, evidence.pose, (measure,))
+    limit_text = "at least" if criterion.highest else "at most"
     # The instructor defined the share, so it is not capped like a measured score.
     return Outcome(
         False,
         share,
-        f"The {found} is worth {float(share) * 100:g}% of the marks; all are given for {bound} {best:g}{unit}.",
+        f"The {value_text} is worth {float(share) * 100:g}% of the marks; all are given for {limit_text} "
+        f"{best:g}{unit}.",
         evidence.t,
         evidence.pose,
         (measure,),

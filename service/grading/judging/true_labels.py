@@ -44,26 +44,26 @@ def collect_labels(criterion: Recognition, assignment: Assignment, truths: Seque
     if criterion.labels:
         return criterion.labels
     # The instructor's places have their own labels. Otherwise, all labels of the floor are possible.
-    on_floor = () if criterion.truth == "places" else list_label_names(assignment.world.background)
-    listed = criterion.truth if isinstance(criterion.truth, tuple) else ()
-    placed = tuple(label for _, _, label in _list_places(criterion))
+    floor_labels = () if criterion.truth == "places" else list_label_names(assignment.world.background)
+    listed_labels = criterion.truth if isinstance(criterion.truth, tuple) else ()
+    place_labels = tuple(label for _, _, label in _list_places(criterion))
     greys = CODES[criterion.greys].values() if isinstance(criterion.greys, str) else criterion.greys
-    return tuple(dict.fromkeys([*on_floor, *listed, *placed, *greys, *truths, *criterion.aliases]))
+    return tuple(dict.fromkeys([*floor_labels, *listed_labels, *place_labels, *greys, *truths, *criterion.aliases]))
 
 
-def _pick_counted(criterion: Recognition, known: Sequence[NumberedTruth]) -> Sequence[NumberedTruth]:
+def _pick_counted(criterion: Recognition, truths: Sequence[NumberedTruth]) -> Sequence[NumberedTruth]:
     match criterion.images:
         case "first":
-            return known[:1]
+            return truths[:1]
         case "last":
-            return known[-1:]
+            return truths[-1:]
         case "all":
-            return known
+            return truths
 
 
 def _collect_known_truths(criterion: Recognition, trial: TrialResult) -> list[NumberedTruth]:
     recording = trial.recording
-    found: list[NumberedTruth] = []
+    truths: list[NumberedTruth] = []
     for number, image in enumerate(recording.images):
         if criterion.near_start is not None and _measure_start_distance(recording, image.pose) > criterion.near_start:
             continue
@@ -85,16 +85,16 @@ def _collect_known_truths(criterion: Recognition, trial: TrialResult) -> list[Nu
             case _:
                 truth = _find_listed_label(criterion, trial)
         if truth is not None:
-            found.append((number, truth))
-    return found
+            truths.append((number, truth))
+    return truths
 
 
 def _map_grey_labels(criterion: Recognition, recording: Recording) -> Mapping[int, str]:
     """Return the label of each grey: the assignment's own, otherwise those of the floor's patches."""
     if isinstance(criterion.greys, str):
         return CODES[criterion.greys]
-    own = {grey: label for label, grey in criterion.greys.items()}
-    return own or GREYS.get(recording.background, {})
+    labels_by_grey = {grey: label for label, grey in criterion.greys.items()}
+    return labels_by_grey or GREYS.get(recording.background, {})
 
 
 def _measure_start_distance(recording: Recording, pose: Pose) -> float:
@@ -104,12 +104,12 @@ def _measure_start_distance(recording: Recording, pose: Pose) -> float:
 
 def _measure_spot_distance(criterion: Recognition, recording: Recording, pose: Pose) -> float:
     """Return the distance of the left sensor, at ``pose``, from the centre of the nearest labelled thing, mm."""
-    look = locate_part(recording, "left", pose)
+    sensor_position = locate_part(recording, "left", pose)
     floor = rebuild_floor(recording)
     labels = () if floor is None else floor.labels
     spots = [(each.x + each.width / 2, each.y + each.height / 2) for each in labels]
     spots += [place[:2] for place in _list_places(criterion)]
-    return min((math.dist(look, spot) for spot in spots), default=math.inf)
+    return min((math.dist(sensor_position, spot) for spot in spots), default=math.inf)
 
 
 def _find_listed_label(criterion: Recognition, trial: TrialResult) -> str | None:
@@ -123,6 +123,8 @@ def _list_places(criterion: Recognition) -> Sequence[LabelledPlace]:
     return () if isinstance(criterion.places, str) else criterion.places
 
 
-def _find_nearest_label(places: Sequence[LabelledPlace], where: tuple[float, float], within: float) -> str | None:
-    near = min(places, key=lambda place: math.dist(place[:2], where), default=None)
-    return near[2] if near is not None and math.dist(near[:2], where) <= within else None
+def _find_nearest_label(
+    places: Sequence[LabelledPlace], position: tuple[float, float], max_distance: float
+) -> str | None:
+    nearest = min(places, key=lambda place: math.dist(place[:2], position), default=None)
+    return nearest[2] if nearest is not None and math.dist(nearest[:2], position) <= max_distance else None

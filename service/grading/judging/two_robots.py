@@ -24,51 +24,51 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
     distances = _compute_distances(recording)
     if distances is None:
         return fail_with("Expected two robots, but there was one.")
-    last = len(distances) - 1
-    first = last if criterion.when == "end" else min(count_ticks_until(recording, criterion.after), last)
-    looked_at = distances[first:]
-    good = (looked_at >= criterion.at_least) & (looked_at <= (criterion.at_most or np.inf))
-    share = Fraction(int(good.sum()), len(good))
+    last_row = len(distances) - 1
+    first_row = last_row if criterion.when == "end" else min(count_ticks_until(recording, criterion.after), last_row)
+    counted_distances = distances[first_row:]
+    is_right = (counted_distances >= criterion.at_least) & (counted_distances <= (criterion.at_most or np.inf))
+    share = Fraction(int(is_right.sum()), len(is_right))
     measures = (
-        Measure("apart at the end", float(distances[last]), "mm"),
-        Measure("least apart", float(looked_at.min()), "mm"),
-        Measure("most apart", float(looked_at.max()), "mm"),
+        Measure("apart at the end", float(distances[last_row]), "mm"),
+        Measure("least apart", float(counted_distances.min()), "mm"),
+        Measure("most apart", float(counted_distances.max()), "mm"),
         Measure("share of the time", float(share) * 100, "%"),
     )
     expected = f"Expected the robots to be {_describe_expected(criterion)}"
     if criterion.when == "always":
-        needed = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
-        told = (
-            f"this was true for {float(share) * 100:.0f}% of the time after {tick_to_seconds(recording, first):.2f} s"
-        )
-        at = first + int(np.argmin(good))
+        required_share = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
+        start = tick_to_seconds(recording, first_row)
+        summary = f"this was true for {float(share) * 100:.0f}% of the time after {start:.2f} s"
+        row = first_row + int(np.argmin(is_right))
         if share >= Fraction(str(criterion.share)):
             return pass_with(
-                f"The robots were {_describe_expected(criterion)}: {told}.",
-                tick_to_seconds(recording, last),
+                f"The robots were {_describe_expected(criterion)}: {summary}.",
+                tick_to_seconds(recording, last_row),
                 recording.end,
                 measures,
             )
         return fail_with(
-            f"{expected} for {needed} of the time, but {told}; at {tick_to_seconds(recording, at):.2f} s they were "
-            f"{distances[at]:.0f} mm apart.",
-            tick_to_seconds(recording, at),
-            get_pose_after(recording, at),
+            f"{expected} for {required_share} of the time, but {summary}; at "
+            f"{tick_to_seconds(recording, row):.2f} s they were "
+            f"{distances[row]:.0f} mm apart.",
+            tick_to_seconds(recording, row),
+            get_pose_after(recording, row),
             share,
             measures,
         )
-    at = first + int(np.argmax(good))
-    if good.any():
-        told = f"at {tick_to_seconds(recording, at):.2f} s the robots were {distances[at]:.0f} mm apart"
+    row = first_row + int(np.argmax(is_right))
+    if is_right.any():
+        summary = f"at {tick_to_seconds(recording, row):.2f} s the robots were {distances[row]:.0f} mm apart"
         return pass_with(
-            f"{told.capitalize()}.", tick_to_seconds(recording, at), get_pose_after(recording, at), measures
+            f"{summary.capitalize()}.", tick_to_seconds(recording, row), get_pose_after(recording, row), measures
         )
-    began = tick_to_seconds(recording, first)
-    ends = "at the end" if criterion.when == "end" else f"at some time after {began:.2f} s"
-    nearest = f"{distances[last]:.0f} mm" if criterion.when == "end" else _format_span(looked_at)
+    start_time = tick_to_seconds(recording, first_row)
+    time_clause = "at the end" if criterion.when == "end" else f"at some time after {start_time:.2f} s"
+    distance_text = f"{distances[last_row]:.0f} mm" if criterion.when == "end" else _format_span(counted_distances)
     return fail_with(
-        f"{expected} {ends}, but they were {nearest} apart.",
-        tick_to_seconds(recording, last),
+        f"{expected} {time_clause}, but they were {distance_text} apart.",
+        tick_to_seconds(recording, last_row),
         recording.end,
         measures=measures,
     )
@@ -78,10 +78,10 @@ def _compute_distances(recording: Recording) -> Floats | None:
     """Return the distance at the start and after each tick, mm; None if there is one robot."""
     if recording.partner is None:
         return None
-    ways = [_collect_positions(recording), _collect_positions(recording.partner)]
-    rows = max(len(way) for way in ways)
-    first, second = (np.vstack((way, np.repeat(way[-1:], rows - len(way), axis=0))) for way in ways)
-    distances: Floats = np.hypot(*(first - second).T)
+    paths = [_collect_positions(recording), _collect_positions(recording.partner)]
+    rows = max(len(way) for way in paths)
+    first_path, second_path = (np.vstack((way, np.repeat(way[-1:], rows - len(way), axis=0))) for way in paths)
+    distances: Floats = np.hypot(*(first_path - second_path).T)
     return distances
 
 

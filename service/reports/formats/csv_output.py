@@ -60,12 +60,12 @@ def to_safe_cell(value: str) -> str:
 
 def _format_submission_row(row: TableRow[View], criteria: Sequence[str]) -> list[str]:
     grade = None if row.grade is None else row.grade.grade
-    marked = (
+    grade_cells = (
         _format_grade_cells(grade, criteria)
         if grade is not None
         else [""] * (3 + len(_ACCURACY_COLUMNS) + len(criteria) + 3)
     )
-    return [*_format_student_cells(row), *marked, row.source, row.reason]
+    return [*_format_student_cells(row), *grade_cells, row.source, row.reason]
 
 
 def _format_grade_cells(grade: Grade, criteria: Sequence[str]) -> list[str]:

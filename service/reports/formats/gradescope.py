@@ -64,8 +64,13 @@ def render_gradescope_list(rows: Sequence[TableRow[GradebookView]]) -> str:
 
 def _row_to_json(row: TableRow[GradebookView]) -> dict[str, Any]:
     document = build_gradescope_document(row.grade) if row.grade is not None else _ungraded_to_json(row.reason)
-    who = {"student": row.student.id, "name": row.student.name, "email": row.student.email, "file": row.source}
-    return {**document, "extra_data": {**who, **document.get("extra_data", {"assignment": row.assignment})}}
+    student_fields = {
+        "student": row.student.id,
+        "name": row.student.name,
+        "email": row.student.email,
+        "file": row.source,
+    }
+    return {**document, "extra_data": {**student_fields, **document.get("extra_data", {"assignment": row.assignment})}}
 
 
 def _ungraded_to_json(reason: str) -> dict[str, Any]:
@@ -90,12 +95,16 @@ def _criterion_to_json(number: int, result: CriterionResult) -> dict[str, Any]:
 
 
 def _format_output(view: GradebookView, submission: Submission | None) -> str:
-    shown = view.shown
-    diagnosis = diagnose(shown, submission)
-    lines = [f"Comment: {comment}" for comment in format_comments(shown)]
+    grade = view.shown
+    diagnosis = diagnose(grade, submission)
+    lines = [f"Comment: {comment}" for comment in format_comments(grade)]
     lines += [diagnosis.cause, *format_excerpt(diagnosis), f"Next: {diagnosis.next_step}"]
-    lines += [*diagnosis.further, describe_outcome(shown, diagnosis)]
-    for told, group in describe_other_faults(diagnosis.cause, shown):
-        lines += [told, *([group.hint] if group.hint and told != group.where else []), f"({group.how_often})"]
-    lines += [f"Note: {to_display_text(note, 300)}" for note in shown.notes[:20]]
-    return "\n".join([*lines, f"sandbox: {shown.sandbox}"])
+    lines += [*diagnosis.further, describe_outcome(grade, diagnosis)]
+    for description, group in describe_other_faults(diagnosis.cause, grade):
+        lines += [
+            description,
+            *([group.hint] if group.hint and description != group.where else []),
+            f"({group.how_often})",
+        ]
+    lines += [f"Note: {to_display_text(note, 300)}" for note in grade.notes[:20]]
+    return "\n".join([*lines, f"sandbox: {grade.sandbox}"])

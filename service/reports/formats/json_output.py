@@ -99,12 +99,18 @@ def render_json_list(rows: Sequence[TableRow[View]]) -> str:
 
 def _row_to_json(row: TableRow[View]) -> dict[str, Any]:
     student = row.student
-    who = {"student": student.id, "name": student.name, "email": student.email, "file": row.source}
-    why = {"reason": replace_surrogates(row.reason)} if row.reason else {}
+    student_fields = {"student": student.id, "name": student.name, "email": student.email, "file": row.source}
+    reason_field = {"reason": replace_surrogates(row.reason)} if row.reason else {}
     if row.grade is None:
-        none = {"schema": SCHEMA, "assignment": row.assignment, "marks": None, "max_marks": None, "verdict": None}
-        return {**who, **why, **none}
-    return {**who, **why, **build_json_document(row.grade)}
+        empty_grade = {
+            "schema": SCHEMA,
+            "assignment": row.assignment,
+            "marks": None,
+            "max_marks": None,
+            "verdict": None,
+        }
+        return {**student_fields, **reason_field, **empty_grade}
+    return {**student_fields, **reason_field, **build_json_document(row.grade)}
 
 
 def _excerpt_to_json(excerpt: Excerpt) -> dict[str, Any]:
@@ -114,14 +120,14 @@ def _excerpt_to_json(excerpt: Excerpt) -> dict[str, Any]:
     return {"of": replace_surrogates(excerpt.name), "lines": lines}
 
 
-def _adjustment_to_json(said: StaffAdjustment) -> dict[str, Any]:
+def _adjustment_to_json(adjustment: StaffAdjustment) -> dict[str, Any]:
     """Return a staff adjustment: the grader's marks (None if it could not judge), the maximum, and the change."""
-    graded = None if said.graded is None else to_json_number(said.graded)
+    graded_marks = None if adjustment.graded is None else to_json_number(adjustment.graded)
     return {
-        "from": graded,
-        "of": to_json_number(said.worth),
-        "excused": said.excused,
-        "reason": replace_surrogates(said.reason),
+        "from": graded_marks,
+        "of": to_json_number(adjustment.worth),
+        "excused": adjustment.excused,
+        "reason": replace_surrogates(adjustment.reason),
     }
 
 
@@ -134,14 +140,14 @@ def _recording_to_json(recording: Recording) -> dict[str, Any]:
 
 def _message_to_json(message: Message) -> dict[str, Any]:
     """Return a message with its time and, if the channel lost or corrupted it, how, and the robot's position."""
-    words: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": replace_surrogates(message.text)}
+    data: dict[str, Any] = {"t": message.t, "sender": message.sender, "text": replace_surrogates(message.text)}
     if message.lost:
-        words["lost"] = message.lost
+        data["lost"] = message.lost
         if message.distance is not None:
-            words |= {"distance": message.distance, "angle": message.angle}
+            data |= {"distance": message.distance, "angle": message.angle}
     if message.arrived_as is not None:
-        words["arrived_as"] = replace_surrogates(message.arrived_as)
-    return words
+        data["arrived_as"] = replace_surrogates(message.arrived_as)
+    return data
 
 
 def _accuracy_to_json(accuracy: Accuracy | None) -> dict[str, float | int] | None:

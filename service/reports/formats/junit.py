@@ -48,13 +48,18 @@ def _render_document(suites: Sequence[ElementTree.Element]) -> str:
 
 def _build_row_suite(row: TableRow[View]) -> ElementTree.Element:
     student = row.student
-    who = [("student", student.id), ("name", student.name), ("email", student.email), ("file", row.source)]
-    who += [("reason", row.reason)]
-    known = [(name, value) for name, value in who if value]
+    student_properties = [
+        ("student", student.id),
+        ("name", student.name),
+        ("email", student.email),
+        ("file", row.source),
+    ]
+    student_properties += [("reason", row.reason)]
+    properties = [(name, value) for name, value in student_properties if value]
     if row.grade is not None:
-        return _build_grade_suite(row.grade.grade, known)
+        return _build_grade_suite(row.grade.grade, properties)
     suite = _create_suite(row.assignment, 1, errors=int(row.refused), skipped=int(not row.refused))
-    _add_properties(suite, known)
+    _add_properties(suite, properties)
     case = ElementTree.SubElement(
         suite,
         "testcase",
@@ -68,17 +73,17 @@ def _build_row_suite(row: TableRow[View]) -> ElementTree.Element:
 
 
 def _build_grade_suite(
-    grade: Grade, who: Sequence[tuple[str, str]], submission: Submission | None = None
+    grade: Grade, student_properties: Sequence[tuple[str, str]], submission: Submission | None = None
 ) -> ElementTree.Element:
-    unmarked = grade.verdict in _NOT_MARKED
-    missed = sum(result.marks < result.max_marks for result in grade.criteria)
+    is_unmarked = grade.verdict in _NOT_MARKED
+    missed_count = sum(result.marks < result.max_marks for result in grade.criteria)
     seconds = sum(trial.recording.end_t for trial in grade.trials)
-    failures, errors = (0, missed) if unmarked else (missed, 0)
+    failures, errors = (0, missed_count) if is_unmarked else (missed_count, 0)
     skipped = sum(result.excused for result in grade.criteria)
     suite = _create_suite(grade.assignment, len(grade.criteria), failures, errors, skipped, seconds=seconds)
-    _add_properties(suite, [*who, *_collect_properties(grade, submission)])
+    _add_properties(suite, [*student_properties, *_collect_properties(grade, submission)])
     for result in grade.criteria:
-        _add_case(suite, grade, result, "error" if unmarked else "failure")
+        _add_case(suite, grade, result, "error" if is_unmarked else "failure")
     return suite
 
 
@@ -86,13 +91,17 @@ def _create_suite(
     name: str, tests: int, failures: int = 0, errors: int = 0, skipped: int = 0, seconds: float = 0
 ) -> ElementTree.Element:
     counts = {"tests": tests, "failures": failures, "errors": errors, "skipped": skipped}
-    told = {"name": to_one_line(name), **{key: str(value) for key, value in counts.items()}, "time": f"{seconds:.3f}"}
-    return ElementTree.Element("testsuite", told)
+    attributes = {
+        "name": to_one_line(name),
+        **{key: str(value) for key, value in counts.items()},
+        "time": f"{seconds:.3f}",
+    }
+    return ElementTree.Element("testsuite", attributes)
 
 
-def _add_properties(suite: ElementTree.Element, told: Sequence[tuple[str, str]]) -> None:
+def _add_properties(suite: ElementTree.Element, pairs: Sequence[tuple[str, str]]) -> None:
     properties = ElementTree.SubElement(suite, "properties")
-    for name, value in told:
+    for name, value in pairs:
         ElementTree.SubElement(properties, "property", name=name, value=to_display_text(value, 600))
 
 

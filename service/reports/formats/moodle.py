@@ -45,45 +45,45 @@ def render_moodle_csv(rows: Sequence[TableRow[GradebookView]]) -> str:
 
 
 @register_worksheet("moodle-worksheet", ".csv", build_gradebook_view)
-def fill_moodle_worksheet(rows: Sequence[TableRow[GradebookView]], given: str) -> FilledWorksheet:
+def fill_moodle_worksheet(rows: Sequence[TableRow[GradebookView]], worksheet: str) -> FilledWorksheet:
     """Fill in Grade and Feedback comments of the worksheet. All other rows and cells stay unchanged.
 
     Raises:
         UsageError: It is not a worksheet, or its assignment has another maximum.
     """
-    mark = "\ufeff" if given.startswith("\ufeff") else ""
-    text = given.removeprefix("\ufeff")
-    first = text.partition("\n")[0]
-    separator = max(",;\t", key=first.count)
+    byte_order_mark = "\ufeff" if worksheet.startswith("\ufeff") else ""
+    text = worksheet.removeprefix("\ufeff")
+    header_line = text.partition("\n")[0]
+    separator = max(",;\t", key=header_line.count)
     try:
         lines = read_rows(text, separator)
     except UnreadableDataError as error:
         raise UsageError(f"the worksheet cannot be read: {error}, expected Moodle's grading worksheet") from None
-    places = {heading: place for place, heading in enumerate(lines[0])} if lines else {}
-    missing = [heading for heading in (_IDENTIFIER, _GRADE) if heading not in places]
+    columns = {heading: place for place, heading in enumerate(lines[0])} if lines else {}
+    missing = [heading for heading in (_IDENTIFIER, _GRADE) if heading not in columns]
     if missing:
         raise UsageError(
             f"the worksheet has no column {' and no column '.join(missing)}, expected the grading worksheet as Moodle "
             "lets it be downloaded, in English"
         )
-    found = _index_lines(lines, places)
+    line_numbers = _index_lines(lines, columns)
     left_over = []
     for row in select_student_rows(rows):
-        place = _find_line(row, found)
-        if place is None:
+        line_number = _find_line(row, line_numbers)
+        if line_number is None:
             left_over.append(row.who)
             continue
-        line = lines[place]
+        line = lines[line_number]
         line += [""] * (len(lines[0]) - len(line))
         if row.grade is not None:
-            _check_maximum(row.grade.entry.worth, line, places)
-            line[places[_GRADE]] = _format_marks(row)
-        feedback = places.get(_FEEDBACK)
+            _check_maximum(row.grade.entry.worth, line, columns)
+            line[columns[_GRADE]] = _format_marks(row)
+        feedback_column = columns.get(_FEEDBACK)
         # A pending submission does not overwrite existing feedback.
-        if feedback is not None and (row.grade is not None or row.refused or not line[feedback]):
-            line[feedback] = to_safe_cell(_format_feedback(row))
-    ending = "\r\n" if first.endswith("\r") else "\n"
-    return FilledWorksheet(mark + render_csv(lines, separator, ending), tuple(left_over))
+        if feedback_column is not None and (row.grade is not None or row.refused or not line[feedback_column]):
+            line[feedback_column] = to_safe_cell(_format_feedback(row))
+    ending = "\r\n" if header_line.endswith("\r") else "\n"
+    return FilledWorksheet(byte_order_mark + render_csv(lines, separator, ending), tuple(left_over))
 
 
 @register_archive("moodle-feedback", ".zip")
@@ -95,18 +95,18 @@ def pack_moodle_feedback(pages: Iterable[ReportPage], sink: BinaryIO) -> tuple[s
     Raises:
         UsageError: No submission came from Moodle.
     """
-    left_over, taken = [], 0
+    left_over, packed_count = [], 0
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
         for page in pages:
-            number_of = parse_moodle_number(page.row.source)
-            if not number_of:
+            participant_number = parse_moodle_number(page.row.source)
+            if not participant_number:
                 left_over.append(page.row.who)
                 continue
-            name = re.sub(r"[_/\\\s]+", " ", page.row.source.partition(f"_{number_of}_")[0])
-            path = f"{name}_{number_of}_assignfeedback_file_/feedback.html"
+            name = re.sub(r"[_/\\\s]+", " ", page.row.source.partition(f"_{participant_number}_")[0])
+            path = f"{name}_{participant_number}_assignfeedback_file_/feedback.html"
             archive.writestr(zipfile.ZipInfo(path, _EPOCH), page.html, zipfile.ZIP_DEFLATED)
-            taken += 1
-    if not taken:
+            packed_count += 1
+    if not packed_count:
         raise UsageError("none of these submissions came from Moodle, expected some of a download of its assignment")
     return tuple(left_over)
 
@@ -116,54 +116,54 @@ def _format_marks(row: TableRow[GradebookView]) -> str:
 
 
 def _format_feedback(row: TableRow[GradebookView]) -> str:
-    told = [] if row.grade is None else row.grade.shown.criteria
-    lines = [f"{each.title}: {_format_criterion_marks(each)}. {each.message}" for each in told]
+    criteria = [] if row.grade is None else row.grade.shown.criteria
+    lines = [f"{each.title}: {_format_criterion_marks(each)}. {each.message}" for each in criteria]
     lines += [f"Note: {note}" for note in row.grade.shown.notes[:20]] if row.grade is not None else []
     if row.reason:
         lines.insert(0, row.reason if row.grade is not None else f"Not graded: {row.reason}")
-    first: list[str] = []
+    summary: list[str] = []
     if row.grade is not None:
         diagnosis = diagnose(row.grade.shown)
-        first = [*format_comments(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
-    return to_one_line(" ".join([*first, "; ".join(lines)]), _LONGEST)
+        summary = [*format_comments(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
+    return to_one_line(" ".join([*summary, "; ".join(lines)]), _LONGEST)
 
 
 def _format_criterion_marks(result: CriterionResult) -> str:
     return "excused" if result.excused else f"{format_decimal(result.marks)} of {format_decimal(result.max_marks)}"
 
 
-def _index_lines(lines: Sequence[Sequence[str]], places: Mapping[str, int]) -> dict[tuple[str, str], int]:
+def _index_lines(lines: Sequence[Sequence[str]], columns: Mapping[str, int]) -> dict[tuple[str, str], int]:
     """Return the line of each identifier, by column and value, without values that several lines share."""
-    called: list[tuple[tuple[str, str], int]] = []
-    for place, line in enumerate(lines[1:], start=1):
+    identifiers: list[tuple[tuple[str, str], int]] = []
+    for line_number, line in enumerate(lines[1:], start=1):
         for heading in (_IDENTIFIER, *_NAMES):
-            cell = line[places[heading]].strip() if heading in places and places[heading] < len(line) else ""
+            cell = line[columns[heading]].strip() if heading in columns and columns[heading] < len(line) else ""
             if heading == _IDENTIFIER:
                 cell = (re.findall(r"\d+$", cell) or [""])[0]
             if cell:
-                called.append(((heading, cell.casefold()), place))
-    times = Counter(key for key, _ in called)
-    return {key: place for key, place in called if times[key] == 1}
+                identifiers.append(((heading, cell.casefold()), line_number))
+    key_counts = Counter(key for key, _ in identifiers)
+    return {key: place for key, place in identifiers if key_counts[key] == 1}
 
 
-def _find_line(row: TableRow[GradebookView], found: Mapping[tuple[str, str], int]) -> int | None:
-    number_of = parse_moodle_number(row.source)
-    if number_of:
-        return found.get((_IDENTIFIER, number_of))
+def _find_line(row: TableRow[GradebookView], line_numbers: Mapping[tuple[str, str], int]) -> int | None:
+    participant_number = parse_moodle_number(row.source)
+    if participant_number:
+        return line_numbers.get((_IDENTIFIER, participant_number))
     student = row.student
     names = ((_NAMES[0], student.id), (_NAMES[1], student.email), (_NAMES[2], student.name or student.id))
-    places = (found.get((heading, name.casefold())) for heading, name in names if name)
-    return next((place for place in places if place is not None), None)
+    candidates = (line_numbers.get((heading, name.casefold())) for heading, name in names if name)
+    return next((place for place in candidates if place is not None), None)
 
 
-def _check_maximum(most: Decimal, line: Sequence[str], places: Mapping[str, int]) -> None:
+def _check_maximum(maximum: Decimal, line: Sequence[str], columns: Mapping[str, int]) -> None:
     try:
-        asked = Decimal(line[places[_MAXIMUM]].replace(",", "."))
+        worksheet_maximum = Decimal(line[columns[_MAXIMUM]].replace(",", "."))
     except (KeyError, InvalidOperation):
         return
-    if asked != most:
+    if worksheet_maximum != maximum:
         raise UsageError(
-            f"the worksheet's Maximum Grade is {format_decimal(asked)} and the assignment gives "
-            f"{format_decimal(most)} marks; expected "
+            f"the worksheet's Maximum Grade is {format_decimal(worksheet_maximum)} and the assignment gives "
+            f"{format_decimal(maximum)} marks; expected "
             "the same: set the maximum in Moodle and download the worksheet again"
         )

@@ -61,10 +61,10 @@ def register_document(name: str, suffix: str, view: Callable[[Grade], Any]) -> C
     """Register a function that writes one grade, as seen through ``view``, with the submission if it is given."""
 
     def register(render: _Writes) -> _Writes:
-        def written(grade: Grade, submission: Submission | None = None, /) -> str:
+        def render_document(grade: Grade, submission: Submission | None = None, /) -> str:
             return render(view(grade), submission)
 
-        FORMATS[name] = replace(_find_format(name), suffix=suffix, document=written)
+        FORMATS[name] = replace(_find_format(name), suffix=suffix, document=render_document)
         return render
 
     return register
@@ -135,10 +135,10 @@ def register_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Sho
     """Register a function that shows one grade, as seen through ``view``, in a terminal."""
 
     def register(render: _Shows) -> _Shows:
-        def shown(grade: Grade, submission: Submission | None = None, /) -> RenderableType:
+        def render_terminal(grade: Grade, submission: Submission | None = None, /) -> RenderableType:
             return render(view(grade), submission)
 
-        FORMATS[name] = replace(_find_format(name), terminal=shown)
+        FORMATS[name] = replace(_find_format(name), terminal=render_terminal)
         return render
 
     return register

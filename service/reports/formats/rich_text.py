@@ -33,17 +33,19 @@ _STYLES = {"good": "green", "notice": "yellow", "bad": "red"}
 def render_rich_report(view: View, submission: Submission | None = None) -> RenderableType:
     """Return the grade as one renderable. Print it with ``rich.console.Console().print``."""
     grade = view.grade
-    words = describe_grade(grade)
+    verdict_words = describe_grade(grade)
     heading = Text.assemble(
         (to_one_line(grade.assignment_title), "bold"), "  ", (to_one_line(grade.student, 60), "dim")
     )
     diagnosis = diagnose(grade, submission)
-    verdict = Text.assemble((words.short, _STYLES[words.tone]), ". ", describe_outcome(grade, diagnosis))
+    verdict = Text.assemble(
+        (verdict_words.short, _STYLES[verdict_words.tone]), ". ", describe_outcome(grade, diagnosis)
+    )
     cause = Group(
         Text(diagnosis.cause, style="bold"), *map(Text, format_excerpt(diagnosis)), Text(f"Next: {diagnosis.next_step}")
     )
-    written = [Padding(Text(f"Comment: {comment}"), (0, 0, 0, 2)) for comment in format_comments(grade)]
-    parts: list[RenderableType] = [heading, Padding(cause, (0, 0, 0, 2)), *written]
+    comments = [Padding(Text(f"Comment: {comment}"), (0, 0, 0, 2)) for comment in format_comments(grade)]
+    parts: list[RenderableType] = [heading, Padding(cause, (0, 0, 0, 2)), *comments]
     parts += [build_marks_table(grade, diagnosis.lost), verdict]
     parts += [Text(further) for further in diagnosis.further]
     parts += [_render_fault(told, group) for told, group in describe_other_faults(diagnosis.cause, grade)]
@@ -57,16 +59,21 @@ def render_rich_report(view: View, submission: Submission | None = None) -> Rend
     return Group(*parts)
 
 
-def build_marks_table(grade: Grade, told: frozenset[int] = frozenset()) -> Table:
-    """Return the criteria with marks and messages, and the total as footer. Criteria in ``told`` have no message."""
+def build_marks_table(grade: Grade, explained_criteria: frozenset[int] = frozenset()) -> Table:
+    """Return the criteria with marks and messages, and the total as footer.
+
+    Criteria in ``explained_criteria`` have no message.
+    """
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
     table.add_column("Marks", justify="right", no_wrap=True, footer=_format_total(grade))
     table.add_column("Criterion", footer=Text("Total"))
     for index, result in enumerate(grade.criteria):
-        full = result.marks >= result.max_marks
-        style = "green" if full else ("red" if result.marks == 0 else "yellow")
+        has_full_marks = result.marks >= result.max_marks
+        style = "green" if has_full_marks else ("red" if result.marks == 0 else "yellow")
         marks = Text(f"{format_decimal(result.marks)} / {format_decimal(result.max_marks)}", style=style)
-        message = Text("" if index in told else to_display_text(result.message, 600, lines=6), style="dim")
+        message = Text(
+            "" if index in explained_criteria else to_display_text(result.message, 600, lines=6), style="dim"
+        )
         if result.for_staff:
             message.append(f"\nFor staff: {to_display_text(result.for_staff, 600)}")
         table.add_row(marks, Group(Text(to_one_line(result.title)), *([message] if message else [])))
@@ -77,10 +84,10 @@ def _format_total(grade: Grade) -> Text:
     return Text(f"{format_decimal(grade.marks)} / {format_decimal(grade.max_marks)}", style="bold")
 
 
-def _render_fault(told: str, group: FaultGroup) -> RenderableType:
-    text = Text(told)
+def _render_fault(description: str, group: FaultGroup) -> RenderableType:
+    text = Text(description)
     text.stylize("bold", 0, len(group.where))
-    if group.hint and told != group.where:
+    if group.hint and description != group.where:
         text.append(f"\n{group.hint}")
     text.append(f"\n({group.how_often})", style="dim")
     return Padding(text, (0, 0, 0, 2))

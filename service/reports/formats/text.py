@@ -30,25 +30,25 @@ def render_plain_text(view: View, submission: Submission | None = None) -> str:
     """Return the grade in lines of at most 96 characters, without colour or control codes."""
     grade = view.grade
     title = f"{to_one_line(grade.assignment_title)}: {to_one_line(grade.student, 60)}"
-    words, diagnosis = describe_grade(grade), diagnose(grade, submission)
+    verdict_words, diagnosis = describe_grade(grade), diagnose(grade, submission)
     lines = [title, "=" * min(len(title), _WIDTH), ""]
-    lines += [f"{format_decimal(grade.marks)} of {format_decimal(grade.max_marks)} marks; {words.short}", ""]
+    lines += [f"{format_decimal(grade.marks)} of {format_decimal(grade.max_marks)} marks; {verdict_words.short}", ""]
     lines += [*_wrap_text(f"→ {diagnosis.cause}", indent=2), *_format_excerpt_block(diagnosis)]
     lines += [*_wrap_text(f"  Next: {diagnosis.next_step}", indent=2), ""]
     for comment in format_comments(grade):
         lines += [*_wrap_text(f"Comment: {comment}", indent=2), ""]
-    of_the_cause = [grade.criteria[index] for index in sorted(diagnosis.lost)]
-    for result in of_the_cause:
+    cause_criteria = [grade.criteria[index] for index in sorted(diagnosis.lost)]
+    for result in cause_criteria:
         lines += _format_criterion(result, "")
-    others = [each for index, each in enumerate(grade.criteria) if index not in diagnosis.lost]
-    lines += [""] if of_the_cause and others else []
-    for result in others:
+    other_criteria = [each for index, each in enumerate(grade.criteria) if index not in diagnosis.lost]
+    lines += [""] if cause_criteria and other_criteria else []
+    for result in other_criteria:
         lines += _format_criterion(result, to_display_text(result.message, 600, lines=6))
     lines += ["", *_wrap_text(describe_outcome(grade, diagnosis))]
     for cause in diagnosis.further:
         lines += ["", *_wrap_text(cause)]
-    for told, group in describe_other_faults(diagnosis.cause, grade):
-        lines += ["", *_format_fault(told, group)]
+    for description, group in describe_other_faults(diagnosis.cause, grade):
+        lines += ["", *_format_fault(description, group)]
     if grade.accuracy is not None:
         lines += ["", describe_accuracy(grade)]
     channel = describe_channel_losses(grade)
@@ -73,9 +73,9 @@ def _format_excerpt_block(diagnosis: Diagnosis) -> list[str]:
     return ["", *lines, ""] if lines else []
 
 
-def _format_fault(told: str, group: FaultGroup) -> list[str]:
-    lines = _wrap_text(told, indent=4)
-    if group.hint and told != group.where:
+def _format_fault(description: str, group: FaultGroup) -> list[str]:
+    lines = _wrap_text(description, indent=4)
+    if group.hint and description != group.where:
         lines += _wrap_text(f"    {group.hint}", indent=4)
     return [*lines, f"    ({group.how_often})"]
 
@@ -83,8 +83,8 @@ def _format_fault(told: str, group: FaultGroup) -> list[str]:
 def _wrap_text(text: str, indent: int = 0) -> list[str]:
     lines: list[str] = []
     for piece in text.split("\n"):
-        first = "" if not lines else " " * indent
+        first_indent = "" if not lines else " " * indent
         lines += textwrap.wrap(
-            piece, _WIDTH, initial_indent=first, subsequent_indent=" " * indent, break_on_hyphens=False
+            piece, _WIDTH, initial_indent=first_indent, subsequent_indent=" " * indent, break_on_hyphens=False
         ) or [""]
     return lines

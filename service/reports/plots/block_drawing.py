@@ -51,22 +51,28 @@ class _PageLayout:
 def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
     """Draw the diagram across the page or, with many levels or long labels, down the page."""
     diagram = replace(diagram, steps=_merge_arrows(diagram))
-    sheet = _compute_page_layout(diagram)
-    figure = create_figure(HEAD + sheet.height + _FOOT, title, subtitle, sheet.width)
-    axes = add_axes(figure, 0, _FOOT, sheet.width, sheet.height)
+    layout = _compute_page_layout(diagram)
+    figure = create_figure(HEAD + layout.height + _FOOT, title, subtitle, layout.width)
+    axes = add_axes(figure, 0, _FOOT, layout.width, layout.height)
     axes.set_axis_off()
-    axes.set_xlim(0, sheet.width)
-    axes.set_ylim(0, sheet.height)
-    width, height = sheet.box
+    axes.set_xlim(0, layout.width)
+    axes.set_ylim(0, layout.height)
+    width, height = layout.box
     for group in diagram.groups:
-        at = [sheet.centres[name] for name in group.members]
-        if at:
-            left, low = min(x for x, _ in at) - width / 2 - 0.09, min(y for _, y in at) - height / 2 - 0.09
-            right, top = max(x for x, _ in at) + width / 2 + 0.09, max(y for _, y in at) + height / 2 + 0.22
+        member_centres = [layout.centres[name] for name in group.members]
+        if member_centres:
+            left, low = (
+                min(x for x, _ in member_centres) - width / 2 - 0.09,
+                min(y for _, y in member_centres) - height / 2 - 0.09,
+            )
+            right, top = (
+                max(x for x, _ in member_centres) + width / 2 + 0.09,
+                max(y for _, y in member_centres) + height / 2 + 0.22,
+            )
             draw_group_frame(axes, left, low, right - left, top - low, group.colour, group.label)
     patches = {}
     for actor in diagram.actors:
-        x, y = sheet.centres[actor.name]
+        x, y = layout.centres[actor.name]
         patches[actor.name] = draw_actor(
             axes, actor, x, y, width, height, break_label(actor.label, width - 0.1, 4), highlights
         )
@@ -75,46 +81,46 @@ def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlig
         shift = _TWO_WAYS if (arrow.target, arrow.source) in pairs else 0.0
         if arrow.source == arrow.target:
             continue
-        start, end, bend = _route_arrow(arrow, sheet, shift, 1 if number % 2 else -1)
+        start, end, bend = _route_arrow(arrow, layout, shift, 1 if number % 2 else -1)
         draw_arrow(axes, arrow, start, end, highlights, (patches[arrow.source], patches[arrow.target]), bend)
-        signed = highlights.add_sign(arrow, break_label(arrow.label, 2.0, 3))
-        x, y = _place_label(start, end, bend, signed if shift else ())
-        draw_label(axes, x, y, signed, choose_arrow_colour(arrow, highlights), va="center")
+        label_lines = highlights.add_sign(arrow, break_label(arrow.label, 2.0, 3))
+        x, y = _place_label(start, end, bend, label_lines if shift else ())
+        draw_label(axes, x, y, label_lines, choose_arrow_colour(arrow, highlights), va="center")
     highlights.draw_explanation(figure)
     return figure
 
 
 def _merge_arrows(diagram: Diagram) -> tuple[DiagramArrow, ...]:
     """Return the arrows, with coinciding ones merged and their labels joined."""
-    found: dict[tuple[str, str, str], DiagramArrow] = {}
+    merged_arrows: dict[tuple[str, str, str], DiagramArrow] = {}
     for arrow in diagram.arrows:
         key = (arrow.source, arrow.target, arrow.heads)
-        before = found.get(key)
-        words = [each.label for each in (before, arrow) if each is not None and each.label]
-        found[key] = replace(before or arrow, label=" / ".join(dict.fromkeys(words)))
-    return tuple(found.values())
+        earlier_arrow = merged_arrows.get(key)
+        labels = [each.label for each in (earlier_arrow, arrow) if each is not None and each.label]
+        merged_arrows[key] = replace(earlier_arrow or arrow, label=" / ".join(dict.fromkeys(labels)))
+    return tuple(merged_arrows.values())
 
 
 def _compute_page_layout(diagram: Diagram) -> _PageLayout:
     layout = compute_layout(diagram)
     levels = 1 + max(position.level for position in layout.values())
     rows = 1 + int(2 * max(position.row for position in layout.values()))
-    words = max((len(line) for arrow in diagram.arrows for line in break_label(arrow.label, 2.0, 3)), default=0)
-    gap = max(_GAP, words / CHARACTERS + 0.26)
-    down = diagram.portrait or levels > _MOST_ACROSS or _compute_width(levels, gap) > WIDTH
-    across, below = (rows, levels) if down else (levels, rows)
-    width = max(WIDTH, _compute_width(across, gap))
+    longest_label = max((len(line) for arrow in diagram.arrows for line in break_label(arrow.label, 2.0, 3)), default=0)
+    gap = max(_GAP, longest_label / CHARACTERS + 0.26)
+    is_vertical = diagram.portrait or levels > _MOST_ACROSS or _compute_width(levels, gap) > WIDTH
+    boxes_across, boxes_down = (rows, levels) if is_vertical else (levels, rows)
+    width = max(WIDTH, _compute_width(boxes_across, gap))
     lines = max(len(break_label(actor.label, _BOX - 0.1, 4)) for actor in diagram.actors)
-    framed = 0.24 if diagram.groups else 0.0
+    frame_height = 0.24 if diagram.groups else 0.0
     box = (_BOX, max(0.4, LINE_HEIGHT * lines + 0.2))
-    spread = (width - 2 * _MARGIN - _BOX) / max(1, across - 1)
-    step = (_BOX + gap if down else min(_BOX + 1.4, spread), box[1] + _ROW + framed)
-    height = box[1] + step[1] * (below - 1) + 2 * _MARGIN + framed
+    column_spacing = (width - 2 * _MARGIN - _BOX) / max(1, boxes_across - 1)
+    spacing = (_BOX + gap if is_vertical else min(_BOX + 1.4, column_spacing), box[1] + _ROW + frame_height)
+    height = box[1] + spacing[1] * (boxes_down - 1) + 2 * _MARGIN + frame_height
     centres = {}
     for name, position in layout.items():
         level = position.level - (levels - 1) / 2
-        right, low = (position.row, level) if down else (level, position.row)
-        centres[name] = (width / 2 + right * step[0], height / 2 - low * step[1])
+        x_offset, y_offset = (position.row, level) if is_vertical else (level, position.row)
+        centres[name] = (width / 2 + x_offset * spacing[0], height / 2 - y_offset * spacing[1])
     return _PageLayout(box, centres, width, height)
 
 
@@ -123,26 +129,26 @@ def _compute_width(boxes: int, gap: float) -> float:
     return boxes * _BOX + (boxes - 1) * gap + 2 * _MARGIN
 
 
-def _route_arrow(arrow: DiagramArrow, sheet: _PageLayout, shift: float, side: int) -> tuple[Point, Point, float]:
+def _route_arrow(arrow: DiagramArrow, layout: _PageLayout, shift: float, side: int) -> tuple[Point, Point, float]:
     """Return the line's ends and bend: shifted if there is a return arrow, and bent round boxes in its way."""
-    (x, y), (to_x, to_y) = sheet.centres[arrow.source], sheet.centres[arrow.target]
+    (x, y), (to_x, to_y) = layout.centres[arrow.source], layout.centres[arrow.target]
     length = max(1e-6, ((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5)
-    aside = (-(to_y - y) / length * shift, (to_x - x) / length * shift)
-    start, end = (x + aside[0], y + aside[1]), (to_x + aside[0], to_y + aside[1])
-    others = [at for name, at in sheet.centres.items() if name not in (arrow.source, arrow.target)]
+    offset = (-(to_y - y) / length * shift, (to_x - x) / length * shift)
+    start, end = (x + offset[0], y + offset[1]), (to_x + offset[0], to_y + offset[1])
+    other_centres = [at for name, at in layout.centres.items() if name not in (arrow.source, arrow.target)]
     for bend in (side * each for each in _BENDS):
-        if not any(_is_crossing_box(at, start, end, bend, sheet.box) for at in others):
+        if not any(_is_crossing_box(at, start, end, bend, layout.box) for at in other_centres):
             return start, end, bend
     return start, end, 0.0
 
 
-def _compute_curve_point(start: Point, end: Point, bend: float, part: float) -> Point:
-    """Return a point on the curve that Matplotlib draws as ``arc3``, at the fraction ``part`` of its length."""
+def _compute_curve_point(start: Point, end: Point, bend: float, fraction: float) -> Point:
+    """Return a point on the curve that Matplotlib draws as ``arc3``, at the fraction ``fraction`` of its length."""
     control = (
         (start[0] + end[0]) / 2 + bend * (end[1] - start[1]),
         (start[1] + end[1]) / 2 - bend * (end[0] - start[0]),
     )
-    a, b, c = (1 - part) ** 2, 2 * part * (1 - part), part**2
+    a, b, c = (1 - fraction) ** 2, 2 * fraction * (1 - fraction), fraction**2
     return a * start[0] + b * control[0] + c * end[0], a * start[1] + b * control[1] + c * end[1]
 
 
@@ -160,13 +166,13 @@ def _is_crossing_box(
     return False
 
 
-def _place_label(start: Point, end: Point, bend: float, beside: tuple[str, ...]) -> Point:
-    """Return the middle of the curve, or the centre of a label ``beside`` it, on its left."""
+def _place_label(start: Point, end: Point, bend: float, lines: tuple[str, ...]) -> Point:
+    """Return the middle of the curve, or the centre of a label ``lines`` it, on its left."""
     x, y = _compute_curve_point(start, end, bend, 0.5)
-    if not beside:
+    if not lines:
         return x, y
     length = max(1e-6, ((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2) ** 0.5)
-    across, up = -(end[1] - start[1]) / length, (end[0] - start[0]) / length
-    half = max(map(len, beside)) / CHARACTERS / 2, LINE_HEIGHT * len(beside) / 2
-    away = abs(across) * half[0] + abs(up) * half[1] + 0.04
-    return x + across * away, y + up * away
+    normal_x, normal_y = -(end[1] - start[1]) / length, (end[0] - start[0]) / length
+    half_size = max(map(len, lines)) / CHARACTERS / 2, LINE_HEIGHT * len(lines) / 2
+    distance = abs(normal_x) * half_size[0] + abs(normal_y) * half_size[1] + 0.04
+    return x + normal_x * distance, y + normal_y * distance

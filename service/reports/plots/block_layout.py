@@ -21,19 +21,22 @@ class BlockPosition:
 
 def compute_layout(diagram: Diagram) -> Mapping[str, BlockPosition]:
     """Return a position for each actor. Arrows count in the order of the text, whatever their direction."""
-    named = [name for arrow in diagram.arrows for name in (arrow.source, arrow.target)]
-    order = {name: number for number, name in enumerate(dict.fromkeys([*named, *(a.name for a in diagram.actors)]))}
-    group = {name: number for number, each in enumerate(diagram.groups) for name in each.members}
+    arrow_names = [name for arrow in diagram.arrows for name in (arrow.source, arrow.target)]
+    order = {
+        name: number for number, name in enumerate(dict.fromkeys([*arrow_names, *(a.name for a in diagram.actors)]))
+    }
+    group_numbers = {name: number for number, each in enumerate(diagram.groups) for name in each.members}
     levels = dict.fromkeys(order, 0)
     pairs = sorted({tuple(sorted((order[a.source], order[a.target]))) for a in diagram.arrows if a.source != a.target})
     names = list(order)
-    for one, other in pairs:  # the levels of earlier actors are final
-        levels[names[other]] = max(levels[names[other]], levels[names[one]] + 1)
+    for first_index, second_index in pairs:  # the levels of earlier actors are final
+        levels[names[second_index]] = max(levels[names[second_index]], levels[names[first_index]] + 1)
     layout: dict[str, BlockPosition] = {}
     for level in range(max(levels.values(), default=0) + 1):
-        here = sorted(
-            (name for name in order if levels[name] == level), key=lambda name: (group.get(name, -1), order[name])
+        level_names = sorted(
+            (name for name in order if levels[name] == level),
+            key=lambda name: (group_numbers.get(name, -1), order[name]),
         )
-        for row, name in enumerate(here):
-            layout[name] = BlockPosition(level, row - (len(here) - 1) / 2)
+        for row, name in enumerate(level_names):
+            layout[name] = BlockPosition(level, row - (len(level_names) - 1) / 2)
     return layout

@@ -47,10 +47,10 @@ class ConfusionTable:
 
 def build_confusion_table(accuracy: Accuracy) -> ConfusionTable:
     """Return all labels in order, then answers that are not labels, then ``no answer`` if there was one."""
-    seen = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
-    truths = tuple(dict.fromkeys((*accuracy.labels, *seen)))
-    given = dict.fromkeys(answer for _, answer, _ in accuracy.confusion if answer is not None)
-    answers = tuple(dict.fromkeys((*truths, *given)))
+    seen_truths = dict.fromkeys(truth for truth, _, _ in accuracy.confusion)
+    truths = tuple(dict.fromkeys((*accuracy.labels, *seen_truths)))
+    given_answers = dict.fromkeys(answer for _, answer, _ in accuracy.confusion if answer is not None)
+    answers = tuple(dict.fromkeys((*truths, *given_answers)))
     counts = {(truth, answer): 0 for truth in truths for answer in (*answers, None)}
     for truth, answer, count in accuracy.confusion:
         counts[truth, answer] += count
@@ -76,38 +76,38 @@ def select_unit(accuracy: Accuracy) -> str:
 
 def draw_confusion_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     """Draw the confusion matrix of ``table``."""
-    across = len(table.answers) + _TOTALS
+    column_count = len(table.answers) + _TOTALS
     labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
-    cell = min(0.56, (WIDTH - labels - 0.14) / across)
-    body = cell * (len(table.truths) + 0.85)
-    upright = any(len(answer) > _SHORT for answer in table.answers)
-    heads = _HEADS if upright else _SHORT_HEADS
-    figure = create_figure(HEAD + heads + body + _FOOT, title, subtitle)
-    axes = add_axes(figure, labels, _FOOT, cell * across, body + heads)
+    cell = min(0.56, (WIDTH - labels - 0.14) / column_count)
+    body_height = cell * (len(table.truths) + 0.85)
+    is_upright = any(len(answer) > _SHORT for answer in table.answers)
+    heading_height = _HEADS if is_upright else _SHORT_HEADS
+    figure = create_figure(HEAD + heading_height + body_height + _FOOT, title, subtitle)
+    axes = add_axes(figure, labels, _FOOT, cell * column_count, body_height + heading_height)
     axes.set_axis_off()
-    axes.set_xlim(0, across)
-    axes.set_ylim(body / cell, -heads / cell)
+    axes.set_xlim(0, column_count)
+    axes.set_ylim(body_height / cell, -heading_height / cell)
     size = 9.0 if cell > 0.4 else max(8.0, 22 * cell)
-    _draw_names(axes, table, _reduce_size(size), upright=upright)
+    _draw_names(axes, table, _reduce_size(size), is_upright=is_upright)
     _draw_cells(axes, table, size)
-    told = (
+    legend_lines = (
         "precision: correct share of the answers",
         "✓: correct  ✗: wrong;  recall: correct share of the images",
         "rows: true class;  columns: answer",
     )
-    for number, line in enumerate(told):
+    for number, line in enumerate(legend_lines):
         write_text(figure, 0.08, 0.10 + 0.14 * number, line, size=8, colour=FAINT)
     return figure
 
 
-def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, upright: bool) -> None:
+def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, is_upright: bool) -> None:
     """Draw all headings in one direction: horizontal if every name is short, otherwise upright."""
     for row, truth in enumerate((*table.truths, "precision")):
         _draw_name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
     count = len(table.answers)
-    heads = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "total")]
-    for x, name in (*heads, (count + _RECALL, "recall")):
-        if upright:
+    headings = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "total")]
+    for x, name in (*headings, (count + _RECALL, "recall")):
+        if is_upright:
             _draw_name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)
         else:
             _draw_name(axes, x, -0.14, name, size, ha="center", va="bottom")
@@ -127,8 +127,8 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
     for row, counts in enumerate(table.counts):
         for column, count in enumerate(counts):
             share = count / table.totals[row] if table.totals[row] else 0.0
-            right = table.answers[column] == table.truths[row]
-            _draw_cell(axes, (column, row), share, right=right)
+            is_correct = table.answers[column] == table.truths[row]
+            _draw_cell(axes, (column, row), share, is_correct=is_correct)
             colour = "white" if share > 0.55 else (INK if count else FAINT)
             axes.text(
                 column + 0.5, row + (0.66 if count else 0.5), str(count) if count else "·",
@@ -137,17 +137,22 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
             )  # fmt: skip
             if count:
                 axes.text(
-                    column + 0.93, row + 0.06, "✓" if right else "✗", font=load_font(_reduce_size(size), bold=True),
+                    column + 0.93, row + 0.06, "✓" if is_correct else "✗",
+                    font=load_font(_reduce_size(size), bold=True),
                     ha="right", va="top", color=colour,
                 )  # fmt: skip
         _draw_number(axes, len(counts) + _ALL, row, str(table.totals[row]), size)
-        right_ones = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
-        _draw_number(axes, len(counts) + _RECALL, row, _format_share(right_ones, table.totals[row]), _reduce_size(size))
+        correct_count = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
+        _draw_number(
+            axes, len(counts) + _RECALL, row, _format_share(correct_count, table.totals[row]), _reduce_size(size)
+        )
     for column, answer in enumerate(table.answers):
         if answer in table.truths:
-            answered = sum(counts[column] for counts in table.counts)
-            right_ones = table.counts[table.truths.index(answer)][column]
-            _draw_number(axes, column + 0.5, len(table.truths), _format_share(right_ones, answered), _reduce_size(size))
+            answer_count = sum(counts[column] for counts in table.counts)
+            correct_count = table.counts[table.truths.index(answer)][column]
+            _draw_number(
+                axes, column + 0.5, len(table.truths), _format_share(correct_count, answer_count), _reduce_size(size)
+            )
 
 
 def _reduce_size(size: float) -> float:
@@ -159,18 +164,18 @@ def _draw_number(axes: Axes, x: float, row: int, text: str, size: float) -> None
     axes.text(x, row + 0.5, text, font=load_font(size), ha="center", va="center", color=INK)
 
 
-def _format_share(part: int, whole: int) -> str:
+def _format_share(count: int, total: int) -> str:
     """Return a ratio as ``.83``, short enough for ten columns; a dash if the divisor is 0."""
-    if not whole:
+    if not total:
         return "\N{EN DASH}"
-    return str(part // whole) if part in (0, whole) else f"{part / whole:.2f}".lstrip("0")
+    return str(count // total) if count in (0, total) else f"{count / total:.2f}".lstrip("0")
 
 
-def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, right: bool) -> None:
+def _draw_cell(axes: Axes, corner: tuple[int, int], share: float, *, is_correct: bool) -> None:
     # One hue each, from white to dark, so that the order is visible in a greyscale print.
-    darkest = (0.07, 0.27, 0.47) if right else (0.64, 0.09, 0.16)
+    darkest = (0.07, 0.27, 0.47) if is_correct else (0.64, 0.09, 0.16)
     shade = tuple(1 - share * (1 - channel) for channel in darkest)
     axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor=RULE, linewidth=0.7))
-    if right:
+    if is_correct:
         inner = (corner[0] + 0.05, corner[1] + 0.05)
         axes.add_patch(Rectangle(inner, 0.9, 0.9, facecolor="none", edgecolor=INK, linewidth=1.3, zorder=3))

@@ -61,15 +61,15 @@ class AccuracyPanel:
     level: float | None = None
 
 
-def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", counted: str = "images") -> Figure:
-    """Draw the panels below each other, all with an axis from 0 to 1. ``counted`` is the unit of ``n``."""
+def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", unit: str = "images") -> Figure:
+    """Draw the panels below each other, all with an axis from 0 to 1. ``unit`` is the unit of ``n``."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
     figure = create_figure(height, title, subtitle)
-    for place, panel in enumerate(panels):
-        top = height - HEAD - row * place
+    for number, panel in enumerate(panels):
+        top = height - HEAD - row * number
         write_text(figure, 0.08, top - 0.14, to_one_line(panel.varied, 40), size=9, bold=True, va="center")
-        write_text(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, counted), size=8, ha="right",
+        write_text(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, unit), size=8, ha="right",
               va="center", colour=FAINT)  # fmt: skip
         axes = add_axes(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
         draw_panel(axes, panel)
@@ -125,21 +125,21 @@ def draw_curve(axes: Axes, curve: Curve, colour: str = LEFT, line: str = "-", ma
     )  # fmt: skip
 
 
-def _format_counts(curves: Sequence[Curve], counted: str) -> str:
+def _format_counts(curves: Sequence[Curve], unit: str) -> str:
     counts = {count for curve in curves for count in curve.n}
     if not counts:
         return "n = 0"
-    least, most = min(counts), max(counts)
-    return f"n = {least if least == most else f'{least} to {most}'} {counted} per point"
+    minimum, maximum = min(counts), max(counts)
+    return f"n = {minimum if minimum == maximum else f'{minimum} to {maximum}'} {unit} per point"
 
 
 def _select_ticks(xs: Sequence[float]) -> list[float]:
     """Return the ``xs`` whose labels don't overlap: at least an eighteenth of the width apart."""
-    kept: list[float] = []
+    ticks: list[float] = []
     for x in xs:
-        if not kept or x - kept[-1] >= (xs[-1] - xs[0]) / 18:
-            kept.append(x)
-    return kept
+        if not ticks or x - ticks[-1] >= (xs[-1] - xs[0]) / 18:
+            ticks.append(x)
+    return ticks
 
 
 def _cycle_styles(count: int) -> list[tuple[str, str, str]]:

@@ -37,8 +37,8 @@ _MOST_NAMED = 6
 class Differences:
     """The differences: names as in the diagram if only it has them, as in ``talks`` if only the recording has them.
 
-    An arrow at an actor that is itself a difference is not listed. ``alike`` is the fraction of all arrows, 0 to 1,
-    that both have.
+    An arrow at an actor that is itself a difference is not listed. ``similarity`` is the fraction of all arrows, 0 to
+    1, that both have.
     """
 
     drawn_actors: tuple[str, ...] = ()
@@ -51,99 +51,103 @@ class Differences:
         return bool(self.drawn_actors or self.drawn_arrows or self.happened_actors or self.happened_arrows)
 
 
-def compare_with_recording(diagram: Diagram, told: Sequence[MessageCount]) -> Differences | None:
+def compare_with_recording(diagram: Diagram, message_counts: Sequence[MessageCount]) -> Differences | None:
     """Return the differences; None if fewer than two drawn parties took part, so the diagram shows something else.
 
     An arrow may represent a path through parties that are not drawn, and one without a direction represents both.
     Return values of calls need not be drawn.
     """
-    party = {actor.name: identify_actor_party(actor) for actor in diagram.actors}
-    drawn = {each for each in party.values() if each is not None}
-    happened = {identify_party(name) for talk in told for name in (talk.source, talk.target)}
-    if len(drawn & happened) < 2:
+    actor_parties = {actor.name: identify_actor_party(actor) for actor in diagram.actors}
+    drawn_parties = {each for each in actor_parties.values() if each is not None}
+    recorded_parties = {identify_party(name) for talk in message_counts for name in (talk.source, talk.target)}
+    if len(drawn_parties & recorded_parties) < 2:
         return None
-    ways = _find_connections(told, drawn)
-    wrong: dict[Pair, None] = {}
-    covered: set[tuple[str | None, str | None]] = set()
+    connections = _find_connections(message_counts, drawn_parties)
+    wrong_arrows: dict[Pair, None] = {}
+    covered_pairs: set[tuple[str | None, str | None]] = set()
     for arrow in diagram.arrows:
-        pair = (party[arrow.source], party[arrow.target])
-        either = {pair} if arrow.heads == "target" else {pair, pair[::-1]}
-        covered |= either
-        if pair[0] != pair[1] and set(pair) <= happened and not either & ways:
-            wrong[arrow.source, arrow.target] = None
-    missing = [
+        pair = (actor_parties[arrow.source], actor_parties[arrow.target])
+        directions = {pair} if arrow.heads == "target" else {pair, pair[::-1]}
+        covered_pairs |= directions
+        if pair[0] != pair[1] and set(pair) <= recorded_parties and not directions & connections:
+            wrong_arrows[arrow.source, arrow.target] = None
+    missing_arrows = [
         (talk.source, talk.target)
-        for talk in told
+        for talk in message_counts
         if talk.kind != "return"
-        and {identify_party(talk.source), identify_party(talk.target)} <= drawn
-        and (identify_party(talk.source), identify_party(talk.target)) not in covered
+        and {identify_party(talk.source), identify_party(talk.target)} <= drawn_parties
+        and (identify_party(talk.source), identify_party(talk.target)) not in covered_pairs
     ]
-    pairs = {(identify_party(talk.source), identify_party(talk.target)) for talk in told}
-    took_part = dict.fromkeys(name for talk in told for name in (talk.source, talk.target))
+    pairs = {(identify_party(talk.source), identify_party(talk.target)) for talk in message_counts}
+    participants = dict.fromkeys(name for talk in message_counts for name in (talk.source, talk.target))
     return Differences(
-        tuple(name for name, each in party.items() if each not in happened),
-        tuple(wrong),
-        tuple(name for name in took_part if identify_party(name) not in drawn),
-        tuple(dict.fromkeys(missing)),
-        len(covered & pairs) / len(covered | pairs),
+        tuple(name for name, each in actor_parties.items() if each not in recorded_parties),
+        tuple(wrong_arrows),
+        tuple(name for name in participants if identify_party(name) not in drawn_parties),
+        tuple(dict.fromkeys(missing_arrows)),
+        len(covered_pairs & pairs) / len(covered_pairs | pairs),
     )
 
 
-def describe_differences(found: Differences, language: Language = ENGLISH) -> str:
+def describe_differences(differences: Differences, language: Language = ENGLISH) -> str:
     """Return the differences as sentences."""
-    if not found:
+    if not differences:
         return language.say("The diagram matches the events.")
-    told = []
-    if found.drawn_actors:
-        told.append(language.say("%(names)s took no part.", names=_join_names(found.drawn_actors, language)))
-    if found.drawn_arrows:
-        arrows = _join_names(map(_format_arrow, found.drawn_arrows), language)
-        told.append(language.say("%(arrows)s did not happen.", arrows=arrows))
-    if found.happened_actors:
-        told.append(
+    sentences = []
+    if differences.drawn_actors:
+        sentences.append(language.say("%(names)s took no part.", names=_join_names(differences.drawn_actors, language)))
+    if differences.drawn_arrows:
+        arrows = _join_names(map(_format_arrow, differences.drawn_arrows), language)
+        sentences.append(language.say("%(arrows)s did not happen.", arrows=arrows))
+    if differences.happened_actors:
+        sentences.append(
             language.counted(
                 "%(names)s took part and is not drawn.",
                 "%(names)s took part and are not drawn.",
-                len(found.happened_actors),
-                names=_join_names((format_party_name(name, language) for name in found.happened_actors), language),
+                len(differences.happened_actors),
+                names=_join_names(
+                    (format_party_name(name, language) for name in differences.happened_actors), language
+                ),
             )
         )
-    if found.happened_arrows:
-        told.append(
+    if differences.happened_arrows:
+        sentences.append(
             language.counted(
                 "%(arrows)s happened and is not drawn.",
                 "%(arrows)s happened and are not drawn.",
-                len(found.happened_arrows),
-                arrows=_join_names(map(_format_arrow, found.happened_arrows), language),
+                len(differences.happened_arrows),
+                arrows=_join_names(map(_format_arrow, differences.happened_arrows), language),
             )
         )
-    return " ".join(told)
+    return " ".join(sentences)
 
 
 def identify_actor_party(actor: DiagramActor) -> str | None:
     """Return the party of an actor, by its name or else its label; None if it is none of them."""
     for text in (actor.name, actor.label):
-        words = set(_WORD.findall(text.lower()))
-        for party, told_by in _PARTY_KEYWORDS.items():
-            if words & told_by:
+        keywords = set(_WORD.findall(text.lower()))
+        for party, party_keywords in _PARTY_KEYWORDS.items():
+            if keywords & party_keywords:
                 return party
     return None
 
 
-def _find_connections(told: Sequence[MessageCount], drawn: set[str]) -> set[tuple[str | None, str | None]]:
+def _find_connections(
+    message_counts: Sequence[MessageCount], drawn_parties: set[str]
+) -> set[tuple[str | None, str | None]]:
     """Return sender and receiver of each text, directly or through parties that are not drawn."""
-    steps = {(identify_party(talk.source), identify_party(talk.target)) for talk in told}
-    ways: set[tuple[str | None, str | None]] = set()
-    for start in drawn:
-        reached, waiting = {start}, [start]
-        while waiting:
-            here = waiting.pop()
-            for target in {other for one, other in steps if one == here} - reached:
-                reached.add(target)
-                ways.add((start, target))
-                if target not in drawn:
-                    waiting.append(target)
-    return ways
+    steps = {(identify_party(talk.source), identify_party(talk.target)) for talk in message_counts}
+    connections: set[tuple[str | None, str | None]] = set()
+    for start in drawn_parties:
+        reached_parties, pending = {start}, [start]
+        while pending:
+            party = pending.pop()
+            for target in {other for one, other in steps if one == party} - reached_parties:
+                reached_parties.add(target)
+                connections.add((start, target))
+                if target not in drawn_parties:
+                    pending.append(target)
+    return connections
 
 
 def _format_arrow(pair: Pair) -> str:
@@ -152,8 +156,10 @@ def _format_arrow(pair: Pair) -> str:
 
 def _join_names(names: Iterable[str], language: Language) -> str:
     """Join names for a sentence, shortened if there are many."""
-    found = [to_one_line(name, 70) for name in names]
-    if len(found) > _MOST_NAMED:
-        more = language.say("%(count)s more", count=len(found) - _MOST_NAMED + 1)
-        found = [*found[: _MOST_NAMED - 1], more]
-    return language.say(" and ").join([", ".join(found[:-1]), found[-1]] if len(found) > 1 else found)
+    short_names = [to_one_line(name, 70) for name in names]
+    if len(short_names) > _MOST_NAMED:
+        remainder = language.say("%(count)s more", count=len(short_names) - _MOST_NAMED + 1)
+        short_names = [*short_names[: _MOST_NAMED - 1], remainder]
+    return language.say(" and ").join(
+        [", ".join(short_names[:-1]), short_names[-1]] if len(short_names) > 1 else short_names
+    )

@@ -33,26 +33,32 @@ _HAPPENED = "#8a5a00"
 _MOST_EXCHANGES, _MOST_STEPS = 2, 24
 
 
-def draw_own_diagram(own: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
-    """Draw one of the two plots of ``own``."""
-    found = own.differences or Differences()
+def draw_own_diagram(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
+    """Draw one of the two plots of ``own_diagram``."""
+    differences = own_diagram.differences or Differences()
     if plot.kind == "own":
         highlights = Highlights(
-            frozenset(found.drawn_actors), frozenset(found.drawn_arrows), FAULT, "✗", "drawn, did not happen"
+            frozenset(differences.drawn_actors),
+            frozenset(differences.drawn_arrows),
+            FAULT,
+            "✗",
+            "drawn, did not happen",
         )
-        return draw_diagram(own.cell.diagram, plot.title, "as the notebook draws it", highlights)
+        return draw_diagram(own_diagram.cell.diagram, plot.title, "as the notebook draws it", highlights)
     trial = grade.trials[plot.subject]
     subtitle = f"{to_one_line(trial.scenario, 40)}, trial {trial.index + 1}, as it was observed"
-    actors, arrows = found.happened_actors, found.happened_arrows
-    if own.cell.diagram.kind == "blockdiag":
-        happened = build_block_diagram(count_messages(trial.recording))
+    actors, arrows = differences.happened_actors, differences.happened_arrows
+    if own_diagram.cell.diagram.kind == "blockdiag":
+        recorded_diagram = build_block_diagram(count_messages(trial.recording))
     else:
-        happened = build_sequence_diagram(build_conversation(trial.recording, _MOST_EXCHANGES, _MOST_STEPS))
-        happened = replace(happened, actors=_sort_parties(happened.actors, own.cell.diagram.actors))
+        recorded_diagram = build_sequence_diagram(build_conversation(trial.recording, _MOST_EXCHANGES, _MOST_STEPS))
+        recorded_diagram = replace(
+            recorded_diagram, actors=_sort_parties(recorded_diagram.actors, own_diagram.cell.diagram.actors)
+        )
         actors = tuple(map(identify_party, actors))
         arrows = tuple((identify_party(one), identify_party(other)) for one, other in arrows)
     highlights = Highlights(frozenset(actors), frozenset(arrows), _HAPPENED, "+", "happened, is not drawn")
-    return draw_diagram(happened, plot.title, subtitle, highlights)
+    return draw_diagram(recorded_diagram, plot.title, subtitle, highlights)
 
 
 def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highlights) -> Figure:
@@ -61,7 +67,7 @@ def draw_diagram(diagram: Diagram, title: str, subtitle: str, highlights: Highli
     return draw(diagram, title, subtitle, highlights)
 
 
-def _sort_parties(parties: Sequence[DiagramActor], drawn: Sequence[DiagramActor]) -> tuple[DiagramActor, ...]:
+def _sort_parties(parties: Sequence[DiagramActor], drawn_actors: Sequence[DiagramActor]) -> tuple[DiagramActor, ...]:
     """Return the parties in the order in which they are drawn, followed by those that are not."""
-    order = [identify_actor_party(actor) for actor in drawn]
+    order = [identify_actor_party(actor) for actor in drawn_actors]
     return tuple(sorted(parties, key=lambda party: order.index(party.name) if party.name in order else len(order)))

@@ -57,8 +57,8 @@ class Highlights:
     def is_highlighted(self, arrow: DiagramArrow) -> bool:
         """Return whether an arrow is highlighted, itself or through one of its ends."""
         pair = (arrow.source, arrow.target)
-        turned = arrow.heads != "target" and pair[::-1] in self.arrows
-        return pair in self.arrows or turned or not self.actors.isdisjoint(pair)
+        is_reverse_highlighted = arrow.heads != "target" and pair[::-1] in self.arrows
+        return pair in self.arrows or is_reverse_highlighted or not self.actors.isdisjoint(pair)
 
     def add_sign(self, arrow: DiagramArrow, lines: tuple[str, ...]) -> tuple[str, ...]:
         """Return the label of an arrow with the sign before it, for readers who don't distinguish the colours."""
@@ -75,8 +75,8 @@ class Highlights:
 def break_label(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
     """Break a label into lines of at most this width. Its own line breaks stay."""
     width = max(4, int(inches * CHARACTERS))
-    kept = [to_one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
-    lines = [piece for line in kept for piece in textwrap.wrap(line, width) or [""]]
+    source_lines = [to_one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
+    lines = [piece for line in source_lines for piece in textwrap.wrap(line, width) or [""]]
     while lines and not lines[-1]:
         lines.pop()
     if len(lines) > most_lines:
@@ -105,14 +105,14 @@ def draw_actor(
     highlights: Highlights,
 ) -> Patch:
     """Draw an actor centred at ``x``, ``y``, and return the patch where arrows end."""
-    different = actor.name in highlights.actors
+    is_different = actor.name in highlights.actors
     fill = _choose_colour(actor.colour, _FILL)
     patch = _create_shape(actor.shape, x, y, width, height)
     patch.set(
         facecolor="white" if actor.shape in _BARE else fill,
-        edgecolor=highlights.colour if different else "white" if actor.shape in _BARE else FAINT,
-        linewidth=1.8 if different else 0.8,
-        linestyle=_DASHES["dashed"] if different else _DASHES[actor.line],
+        edgecolor=highlights.colour if is_different else "white" if actor.shape in _BARE else FAINT,
+        linewidth=1.8 if is_different else 0.8,
+        linestyle=_DASHES["dashed"] if is_different else _DASHES[actor.line],
         zorder=3,
     )
     axes.add_patch(patch)
@@ -121,7 +121,7 @@ def draw_actor(
         x, y, replace_missing_glyphs("\n".join(lines)), font=load_font(7.8, bold=True), color=ink, ha="center",
         va="center" if len(lines) > 1 else "center_baseline", parse_math=False, linespacing=1.05, zorder=5,
     )  # fmt: skip
-    if different:
+    if is_different:
         axes.text(
             x + width / 2, y + height / 2, highlights.sign, font=load_font(8.5, bold=True), color=highlights.colour,
             ha="center", va="center", zorder=6,
@@ -136,8 +136,10 @@ def choose_arrow_colour(arrow: DiagramArrow, highlights: Highlights) -> str:
         return highlights.colour
     if arrow.failed:
         return FAULT
-    usual = {("robot", "responder"): LEFT, ("responder", "robot"): RIGHT}.get((arrow.source, arrow.target), INK)
-    return _choose_colour(arrow.colour, usual)
+    default_colour = {("robot", "responder"): LEFT, ("responder", "robot"): RIGHT}.get(
+        (arrow.source, arrow.target), INK
+    )
+    return _choose_colour(arrow.colour, default_colour)
 
 
 def draw_arrow(
@@ -154,16 +156,17 @@ def draw_arrow(
     style = "-" if arrow.failed else styles[arrow.heads]
     line = "dotted" if arrow.failed else arrow.line
     if line == "solid" or arrow.open_head or style == "-":
-        drawn = [(style, _DASHES[line], 1.9 if highlights.is_highlighted(arrow) else 1.2)]
+        strokes = [(style, _DASHES[line], 1.9 if highlights.is_highlighted(arrow) else 1.2)]
     else:  # otherwise the heads would be dashed too
-        drawn = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
-    for arrow_style, dashes, thick in drawn:
-        size = "head_length=4.6,head_width=2.6" if thick else "head_length=6.2,head_width=3.4"
-        sized = arrow_style if arrow_style == "-" else f"{arrow_style},{size}"
+        strokes = [("-", _DASHES[line], 1.2), (style, "solid", 0.0)]
+    for arrow_style, dashes, line_width in strokes:
+        size = "head_length=4.6,head_width=2.6" if line_width else "head_length=6.2,head_width=3.4"
+        sized_style = arrow_style if arrow_style == "-" else f"{arrow_style},{size}"
         axes.add_patch(
             FancyArrowPatch(
-                start, end, arrowstyle=sized, connectionstyle=f"arc3,rad={bend}", patchA=ends[0], patchB=ends[1],
-                shrinkA=0, shrinkB=0, mutation_scale=1, color=choose_arrow_colour(arrow, highlights), linewidth=thick,
+                start, end, arrowstyle=sized_style, connectionstyle=f"arc3,rad={bend}", patchA=ends[0], patchB=ends[1],
+                shrinkA=0, shrinkB=0, mutation_scale=1, color=choose_arrow_colour(arrow, highlights),
+                linewidth=line_width,
                 linestyle=dashes, joinstyle="miter", zorder=2,
             )
         )  # fmt: skip
@@ -208,14 +211,14 @@ def _create_cylinder(left: float, low: float, width: float, height: float) -> Pa
     """Return a cylinder: its body, and its lid as a separate open line."""
     x, y = left + width / 2 * (1 + np.cos(_HALF_TURN)), height / 11 * np.sin(_HALF_TURN)
     bottom, top = low + height / 11, low + height * 10 / 11
-    body = [*zip(x, top + y, strict=True), *zip(x[::-1], bottom - y, strict=True), (x[0], top)]
+    body_points = [*zip(x, top + y, strict=True), *zip(x[::-1], bottom - y, strict=True), (x[0], top)]
     lid = list(zip(x[::-1], top - y, strict=True))  # in the direction of the body, otherwise it would be a hole
-    codes = [Path.MOVETO, *[Path.LINETO] * (len(body) - 1), Path.MOVETO, *[Path.LINETO] * (len(lid) - 1)]
-    return PathPatch(Path([*body, *lid], codes))
+    codes = [Path.MOVETO, *[Path.LINETO] * (len(body_points) - 1), Path.MOVETO, *[Path.LINETO] * (len(lid) - 1)]
+    return PathPatch(Path([*body_points, *lid], codes))
 
 
-def _choose_colour(colour: str, otherwise: str) -> str:
-    return colour if colour and is_color_like(colour.lower()) else otherwise
+def _choose_colour(colour: str, default: str) -> str:
+    return colour if colour and is_color_like(colour.lower()) else default
 
 
 def _is_light(colour: str) -> bool:

@@ -78,7 +78,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
     )
 
 
-def render_comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCurve]]) -> bytes:
+def render_comparison_plot(names: Sequence[str], curve_groups: Sequence[Sequence[CardCurve]]) -> bytes:
     """Return a PNG with one panel per condition, and in it one curve for each classifier in ``names``."""
     figure = draw_curves(
         [
@@ -87,7 +87,7 @@ def render_comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCu
                 curves[0].unit,
                 tuple(_build_curve(curve, name) for name, curve in zip(names, curves, strict=True)),
             )
-            for curves in found
+            for curves in curve_groups
         ],
         f"{', '.join(names[:-1])} and {names[-1]}: robustness",
         "same places and same noise for each model",
@@ -95,17 +95,17 @@ def render_comparison_plot(names: Sequence[str], found: Sequence[Sequence[CardCu
     return render_png(figure)
 
 
-def _build_curve(counted: CardCurve, label: str | None = None) -> Curve:
-    intervals = [tally.interval for tally in counted.tallies]
-    counts = {tally.n for tally in counted.tallies}
-    words = label or counted.under
+def _build_curve(card_curve: CardCurve, label: str | None = None) -> Curve:
+    intervals = [tally.interval for tally in card_curve.tallies]
+    counts = {tally.n for tally in card_curve.tallies}
+    condition = label or card_curve.under
     return Curve(
-        label=f"{words}, n = {counts.pop()}" if len(counts) == 1 else words,
-        x=counted.values,
-        share=tuple(tally.share for tally in counted.tallies),
+        label=f"{condition}, n = {counts.pop()}" if len(counts) == 1 else condition,
+        x=card_curve.values,
+        share=tuple(tally.share for tally in card_curve.tallies),
         low=tuple(low for low, _ in intervals),
         high=tuple(high for _, high in intervals),
-        n=tuple(tally.n for tally in counted.tallies),
+        n=tuple(tally.n for tally in card_curve.tallies),
     )
 
 
@@ -116,79 +116,91 @@ def draw_evaluation_misread(evaluation: Evaluation) -> Figure:
     greys.
     """
     misread = [each for each in evaluation.answered if not each.right]
-    chosen = _rank_mistakes(misread)[:MOST_MISREAD]
-    count, total = len(misread), len(evaluation.answered)
-    shown = f"{len(chosen)} of {count}" if len(chosen) < count else f"all {count}" if count else "none"
+    shown_images = _rank_mistakes(misread)[:MOST_MISREAD]
+    count, total_count = len(misread), len(evaluation.answered)
+    count_text = f"{len(shown_images)} of {count}" if len(shown_images) < count else f"all {count}" if count else "none"
     title = f"{evaluation.card.name}: misread images"
-    if not chosen:
-        figure = create_figure(HEAD + 0.3, title, f"none of n = {total} images was misread")
+    if not shown_images:
+        figure = create_figure(HEAD + 0.3, title, f"none of n = {total_count} images was misread")
         write_text(figure, 0.08, 0.1, "No misread images.", size=9)
         return figure
-    heads = 0.40
-    height = heads + _ROW * len(chosen)
-    figure = create_figure(HEAD + height + 0.06, title, f"{shown} misread, of n = {total} images; 14 × 14 grey pixels")
+    heading_height = 0.40
+    height = heading_height + _ROW * len(shown_images)
+    figure = create_figure(
+        HEAD + height + 0.06, title, f"{count_text} misread, of n = {total_count} images; 14 × 14 grey pixels"
+    )
     axes = add_axes(figure, 0.08, 0.06, WIDTH - 0.16, height)
     axes.set_axis_off()
     axes.set_xlim(-0.05, WIDTH - 0.21)
     axes.set_ylim(height, 0)
-    for column, words in enumerate(("misread", "nearest correct\nof that class", "nearest correct\nof that answer")):
-        _draw_text(axes, column * (_SIDE + _GAP), heads - 0.20, words, FAINT, 7.4, va="center")
-    right = [each for each in evaluation.answered if each.right]
-    for row, each in enumerate(chosen):
-        _draw_row(axes, evaluation.card.classes, each, right, heads + row * _ROW)
+    for column, heading in enumerate(("misread", "nearest correct\nof that class", "nearest correct\nof that answer")):
+        _draw_text(axes, column * (_SIDE + _GAP), heading_height - 0.20, heading, FAINT, 7.4, va="center")
+    correct_images = [each for each in evaluation.answered if each.right]
+    for row, image in enumerate(shown_images):
+        _draw_row(axes, evaluation.card.classes, image, correct_images, heading_height + row * _ROW)
     return figure
 
 
 def _rank_mistakes(misread: Sequence[ClassifiedImage]) -> list[ClassifiedImage]:
     """Return the images so that each kind of mistake comes once before any repeats, without duplicates."""
-    seen: set[bytes] = set()
+    seen_images: set[bytes] = set()
     kinds: dict[tuple[int, int], int] = {}
-    ranked = []
-    for number, each in enumerate(misread):
-        image = each.grey.tobytes()
-        if image in seen:
+    ranked_images = []
+    for number, classified_image in enumerate(misread):
+        image = classified_image.grey.tobytes()
+        if image in seen_images:
             continue
-        seen.add(image)
-        kind = (each.place.label, each.answer)
+        seen_images.add(image)
+        kind = (classified_image.place.label, classified_image.answer)
         kinds[kind] = kinds.get(kind, 0) + 1
-        ranked.append((kinds[kind], number, each))
-    return [each for _, _, each in sorted(ranked, key=lambda entry: entry[:2])]
+        ranked_images.append((kinds[kind], number, classified_image))
+    return [each for _, _, each in sorted(ranked_images, key=lambda entry: entry[:2])]
 
 
 def _draw_row(
-    axes: Axes, classes: tuple[str, ...], each: ClassifiedImage, right: Sequence[ClassifiedImage], y: float
+    axes: Axes,
+    classes: tuple[str, ...],
+    misread_image: ClassifiedImage,
+    correct_images: Sequence[ClassifiedImage],
+    y: float,
 ) -> None:
-    shown, read = each.place.label, each.answer
+    true_label, answer_label = misread_image.place.label, misread_image.answer
     for column, (image, colour) in enumerate(
-        ((each, FAULT), (_find_nearest(each, right, shown), SAID), (_find_nearest(each, right, read), SAID))
+        (
+            (misread_image, FAULT),
+            (_find_nearest(misread_image, correct_images, true_label), SAID),
+            (_find_nearest(misread_image, correct_images, answer_label), SAID),
+        )
     ):
         if image is not None:
             _draw_grey(axes, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
     lines = [
-        (f"shows {classes[shown]}", INK, True),
-        (f"✗ read as {classes[read]}", FAULT, True),
-        (_describe_place(each), FAINT, False),
+        (f"shows {classes[true_label]}", INK, True),
+        (f"✗ read as {classes[answer_label]}", FAULT, True),
+        (_describe_place(misread_image), FAINT, False),
     ]
-    above = 0
+    line_count = 0
     for text, colour, bold in lines:
-        broken = textwrap.wrap(text, _LINE)
-        _draw_text(axes, _TEXT, y + 0.02 + 0.14 * above, "\n".join(broken), colour, 8, bold=bold)
-        above += len(broken)
+        wrapped_lines = textwrap.wrap(text, _LINE)
+        _draw_text(axes, _TEXT, y + 0.02 + 0.14 * line_count, "\n".join(wrapped_lines), colour, 8, bold=bold)
+        line_count += len(wrapped_lines)
 
 
-def _describe_place(each: ClassifiedImage) -> str:
-    place = each.place
+def _describe_place(classified_image: ClassifiedImage) -> str:
+    place = classified_image.place
     sheet = f", sheet {place.sheet}" if place.sheet else ""
-    noise = f", noise {each.noise:g}" if each.noise else ""
+    noise = f", noise {classified_image.noise:g}" if classified_image.noise else ""
     return f"x {place.pose.x:g}, y {place.pose.y:g} mm{sheet}{noise}"
 
 
-def _find_nearest(to: ClassifiedImage, among: Sequence[ClassifiedImage], label: int) -> ClassifiedImage | None:
-    same = [each for each in among if each.place.label == label]
-    if not same:
+def _find_nearest(
+    target_image: ClassifiedImage, candidates: Sequence[ClassifiedImage], label: int
+) -> ClassifiedImage | None:
+    same_label_images = [each for each in candidates if each.place.label == label]
+    if not same_label_images:
         return None
-    greys = np.array([each.grey for each in same], np.float64)
-    return same[int(((greys - to.grey) ** 2).mean(axis=(1, 2)).argmin())]
+    greys = np.array([each.grey for each in same_label_images], np.float64)
+    return same_label_images[int(((greys - target_image.grey) ** 2).mean(axis=(1, 2)).argmin())]
 
 
 def _draw_grey(axes: Axes, grey: Grey, x: float, y: float, colour: str, *, dashed: bool) -> None:

@@ -40,8 +40,8 @@ def draw_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
     if plot.kind == "curves":
         return draw_curves([_build_panel(curve) for curve in result.curves], plot.title, to_one_line(result.title, 60))
     if plot.kind == "track":
-        worst = find_worst_track(result.predictions, grade.trials)
-        floor = _find_floor(grade.trials[worst].recording, images)
+        worst_trial = find_worst_track(result.predictions, grade.trials)
+        floor = _find_floor(grade.trials[worst_trial].recording, images)
         return draw_track(result.predictions, grade.trials, plot.title, floor)
     if plot.kind == "misread":
         return draw_misread(find_misread(result.predictions), len(result.predictions), plot.title)
@@ -49,9 +49,9 @@ def draw_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
 
 
 def _build_panel(curve: AccuracyCurve) -> AccuracyPanel:
-    about = CONDITIONS[curve.along] if curve.along in CONDITIONS else VariedCondition(curve.along, "", 0, 0)
+    condition = CONDITIONS[curve.along] if curve.along in CONDITIONS else VariedCondition(curve.along, "", 0, 0)
     levels = curve.levels
-    drawn = Curve(
+    accuracy_curve = Curve(
         "",
         tuple(level.at for level in levels),
         tuple(level.value for level in levels),
@@ -59,7 +59,7 @@ def _build_panel(curve: AccuracyCurve) -> AccuracyPanel:
         tuple(level.high for level in levels),
         tuple(level.n for level in levels),
     )
-    return AccuracyPanel(about.words, about.unit, (drawn,), curve.asked)
+    return AccuracyPanel(condition.words, condition.unit, (accuracy_curve,), curve.asked)
 
 
 def _find_floor(recording: Recording, images: Mapping[str, Pixels]) -> Pixels | None:

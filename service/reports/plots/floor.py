@@ -30,8 +30,10 @@ def draw_floor(floor: Floor) -> Figure:
     figure = create_figure(HEAD + height + _FOOT, floor.name, subtitle)
     axes = add_axes(figure, _LEFT_EDGE, _FOOT, width, height)
     axes.imshow(floor.pixels[:, :, :3], extent=(0, _FLOOR_WIDTH, 0, _FLOOR_HEIGHT), interpolation="antialiased")
-    for x, y, across, up in floor.obstacles:
-        axes.add_patch(Rectangle((x, y), across, up, facecolor=RULE, edgecolor="black", linewidth=0.8))
+    for x, y, obstacle_width, obstacle_height in floor.obstacles:
+        axes.add_patch(
+            Rectangle((x, y), obstacle_width, obstacle_height, facecolor=RULE, edgecolor="black", linewidth=0.8)
+        )
     axes.plot(pose.x, pose.y, marker=(3, 0, pose.heading - 90), color=FAULT, markersize=9, markeredgecolor="white")
     axes.set_xlim(0, _FLOOR_WIDTH)
     axes.set_ylim(0, _FLOOR_HEIGHT)

@@ -56,16 +56,16 @@ def draw_all_plots(
     ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at y = 1143 mm. A
     floor that is in neither is drawn white. A plot that cannot be drawn is an image with a sentence that says so.
     """
-    drawn: dict[str, bytes] = {}
+    png_files: dict[str, bytes] = {}
     for view in (build_staff_view(grade), build_student_view(grade)):
         for plot in list_plots(view.grade):
-            if plot.name not in drawn:
-                drawn[plot.name] = _render_plot(view.grade, plot, images)
-        for own in list_own_diagrams(view.grade, cells):
-            for plot in own.plots:
-                if plot.name not in drawn:
-                    drawn[plot.name] = _render_own_plot(own, view.grade, plot)
-    return drawn
+            if plot.name not in png_files:
+                png_files[plot.name] = _render_plot(view.grade, plot, images)
+        for own_diagram in list_own_diagrams(view.grade, cells):
+            for plot in own_diagram.plots:
+                if plot.name not in png_files:
+                    png_files[plot.name] = _render_own_plot(own_diagram, view.grade, plot)
+    return png_files
 
 
 def _render_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
@@ -75,10 +75,10 @@ def _render_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> byte
     return _render_or_explain(plot, partial(draw_plot, grade, plot, images))
 
 
-def _render_own_plot(own: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
+def _render_own_plot(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
     from service.reports.plots.diagram_drawing import draw_own_diagram
 
-    return _render_or_explain(plot, partial(draw_own_diagram, own, grade, plot))
+    return _render_or_explain(plot, partial(draw_own_diagram, own_diagram, grade, plot))
 
 
 def _render_or_explain(plot: Plot, draw: Callable[[], Figure]) -> bytes:
@@ -100,13 +100,13 @@ def _render_or_explain(plot: Plot, draw: Callable[[], Figure]) -> bytes:
 
 def group_same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:
     """Return groups of recognition criteria that judge the same answers to the same images."""
-    alike: dict[Hashable, list[int]] = {}
+    groups: dict[Hashable, list[int]] = {}
     for index, result in enumerate(grade.criteria):
         confusion = result.accuracy.confusion if result.accuracy is not None else ()
         if result.accuracy is not None or result.predictions:
-            what = (confusion, result.predictions, result.curves, is_for_staff(result.visibility))
-            alike.setdefault(what, []).append(index)
-    return tuple(map(tuple, alike.values()))
+            answer_key = (confusion, result.predictions, result.curves, is_for_staff(result.visibility))
+            groups.setdefault(answer_key, []).append(index)
+    return tuple(map(tuple, groups.values()))
 
 
 def _list_recognition_plots(grade: Grade, language: Language) -> Iterator[Plot]:
@@ -116,7 +116,7 @@ def _list_recognition_plots(grade: Grade, language: Language) -> Iterator[Plot]:
         suffix = build_hidden_suffix(has_hidden_content(grade, result))
         accuracy = result.accuracy
         if accuracy is not None and accuracy.confusion:
-            right = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
+            correct_count = sum(count for truth, answer, count in accuracy.confusion if truth == answer)
             yield Plot(
                 f"confusion-{slugify(result.id)}{suffix}", "confusion", index, "", format_title(say("answers")),
                 say(
@@ -126,13 +126,13 @@ def _list_recognition_plots(grade: Grade, language: Language) -> Iterator[Plot]:
                 say(
                     "Confusion matrix: %(right)s of %(all)s images on the diagonal, accuracy %(value)s, "
                     "interval %(low)s to %(high)s.",
-                    right=right, all=accuracy.n, value=f"{accuracy.value:.2f}", low=f"{accuracy.low:.2f}",
+                    right=correct_count, all=accuracy.n, value=f"{accuracy.value:.2f}", low=f"{accuracy.low:.2f}",
                     high=f"{accuracy.high:.2f}",
                 ),
             )  # fmt: skip
         yield from _list_accuracy_plots(grade, index, result, suffix, language)
         if result.predictions:
-            wrong = [prediction for prediction in result.predictions if not is_right(prediction)]
+            wrong_predictions = [prediction for prediction in result.predictions if not is_right(prediction)]
             yield Plot(
                 f"predictions-{slugify(result.id)}{suffix}",
                 "predictions",
@@ -143,26 +143,26 @@ def _list_recognition_plots(grade: Grade, language: Language) -> Iterator[Plot]:
                     "Images from the left light sensor: the whole image and the part that a network receives. A "
                     "dashed frame marks this part. A thick frame and ✗ mark a wrong answer."
                 ),
-                _describe_predictions(result, wrong, language),
+                _describe_predictions(result, wrong_predictions, language),
             )  # fmt: skip
 
 
-def _describe_predictions(result: CriterionResult, wrong: Sequence[Prediction], language: Language) -> str:
-    answered = "; ".join(
+def _describe_predictions(result: CriterionResult, wrong_predictions: Sequence[Prediction], language: Language) -> str:
+    mistakes = "; ".join(
         language.say(
             "%(truth)s identified as %(answer)s",
             truth=to_one_line(prediction.truth, 40),
             answer=to_one_line(prediction.answer or language.say("nothing"), 40),
         )
-        for prediction in wrong[:4]
+        for prediction in wrong_predictions[:4]
     )
-    told = language.say(
+    summary = language.say(
         "%(shown)s sensor images, %(wrong)s of %(all)s with a wrong answer",
         shown=len(select_predictions(result.predictions)),
-        wrong=len(wrong),
+        wrong=len(wrong_predictions),
         all=len(result.predictions),
     )
-    return f"{told}: {answered}." if answered else f"{told}."
+    return f"{summary}: {mistakes}." if mistakes else f"{summary}."
 
 
 def _list_accuracy_plots(
@@ -172,7 +172,7 @@ def _list_accuracy_plots(
     say = language.say
     title = to_one_line(result.title, 80)
     if result.curves:
-        told = "; ".join(
+        curve_text = "; ".join(
             f"{to_one_line(curve.along, 20)}: "
             + ", ".join(
                 say("%(accuracy)s at %(level)s", accuracy=f"{level.value:.2f}", level=f"{level.at:g}")
@@ -183,11 +183,11 @@ def _list_accuracy_plots(
         yield Plot(
             f"curves-{slugify(result.id)}{suffix}", "curves", index, "", format_title(say("robustness")),
             say("Share of images identified correctly as conditions get harder, for “%(criterion)s”.", criterion=title),
-            say("Accuracy curves. %(curves)s.", curves=told),
+            say("Accuracy curves. %(curves)s.", curves=curve_text),
         )  # fmt: skip
-    on_track = find_tracks(result.predictions, grade.trials)
-    if on_track:
-        right = sum(is_right(prediction) for prediction in result.predictions)
+    tracks = find_tracks(result.predictions, grade.trials)
+    if tracks:
+        correct_count = sum(is_right(prediction) for prediction in result.predictions)
         yield Plot(
             f"track-{slugify(result.id)}{suffix}", "track", index, "", format_title(say("along the track")),
             say(
@@ -196,18 +196,18 @@ def _list_accuracy_plots(
             ),
             say(
                 "%(right)s of %(all)s images identified correctly along the track in %(trials)s trials.",
-                right=right, all=len(result.predictions), trials=len(on_track),
+                right=correct_count, all=len(result.predictions), trials=len(tracks),
             ),
         )  # fmt: skip
-    wrong = find_misread(result.predictions)
-    if wrong:
+    misread_images = find_misread(result.predictions)
+    if misread_images:
         yield Plot(
             f"misread-{slugify(result.id)}{suffix}", "misread", index, "", format_title(say("misread images")),
             say(
                 "Each misread image beside two correct ones: the most similar image of its true class, and the most "
                 "similar image of the class in the answer."
             ),
-            say("%(wrong)s of %(all)s images were misread.", wrong=len(wrong), all=len(result.predictions)),
+            say("%(wrong)s of %(all)s images were misread.", wrong=len(misread_images), all=len(result.predictions)),
         )  # fmt: skip
 
 
@@ -230,9 +230,11 @@ def _list_trial_plots(grade: Grade, language: Language) -> Iterator[Plot]:
             _describe_path(recording, language),
         )  # fmt: skip
         light = recording.ticks.left_rgb[:, 0]
-        heard = say("no readings")
+        readings = say("no readings")
         if len(light):
-            heard = say("left light between %(low)s and %(high)s", low=f"{light.min():.0f}", high=f"{light.max():.0f}")
+            readings = say(
+                "left light between %(low)s and %(high)s", low=f"{light.min():.0f}", high=f"{light.max():.0f}"
+            )
         yield Plot(
             f"sensors-{name}", "sensors", index, scenario, say("%(scenario)s: sensors", scenario=title),
             say(
@@ -241,14 +243,14 @@ def _list_trial_plots(grade: Grade, language: Language) -> Iterator[Plot]:
             ),
             say(
                 "Sensor readings over %(seconds)s seconds: %(readings)s, with messages and speech marked.",
-                seconds=f"{recording.end_t:.1f}", readings=heard,
+                seconds=f"{recording.end_t:.1f}", readings=readings,
             ),
         )  # fmt: skip
 
 
 def _describe_path(recording: Recording, language: Language) -> str:
     start, end, partner = recording.start, recording.end, recording.partner
-    told = language.say(
+    description = language.say(
         "Path over the floor %(floor)s from %(start)s mm, heading %(heading)s degrees, to %(end)s mm, heading "
         "%(end_heading)s degrees. Seconds: %(seconds)s. Touches: %(touches)s.",
         floor=to_one_line(recording.background, 40),
@@ -260,13 +262,13 @@ def _describe_path(recording: Recording, language: Language) -> str:
         touches=len(recording.touches),
     )
     if partner is None:
-        return told
-    other = language.say(
+        return description
+    partner_description = language.say(
         "Path of the second robot from %(start)s mm to %(end)s mm.",
         start=_format_position(partner.start),
         end=_format_position(partner.end),
     )
-    return f"{told} {other}"
+    return f"{description} {partner_description}"
 
 
 def _format_position(pose: Pose) -> str:

@@ -42,21 +42,21 @@ class MessageCount:
 def count_messages(recording: Recording) -> tuple[MessageCount, ...]:
     """Return the counts by sender and receiver, messages first."""
     counts: Counter[tuple[str, str, MessageKind]] = Counter()
-    lost: Counter[tuple[str, str, MessageKind]] = Counter()
-    for talk, arrived in _iterate_messages(recording):
-        counts[talk] += 1
-        lost[talk] += not arrived
-    return tuple(MessageCount(*talk, count, lost[talk]) for talk, count in counts.items())
+    lost_counts: Counter[tuple[str, str, MessageKind]] = Counter()
+    for message_key, is_delivered in _iterate_messages(recording):
+        counts[message_key] += 1
+        lost_counts[message_key] += not is_delivered
+    return tuple(MessageCount(*talk, count, lost_counts[talk]) for talk, count in counts.items())
 
 
 def _iterate_messages(recording: Recording) -> Iterator[tuple[tuple[str, str, MessageKind], bool]]:
     """Yield sender, receiver and kind of each message and call, and whether it arrived."""
-    for robot, own in iterate_robots(recording):
-        for message in own.messages:
-            other = PARTNER_OF[robot] if message.to_partner else "responder"
+    for robot, robot_recording in iterate_robots(recording):
+        for message in robot_recording.messages:
+            other_party = PARTNER_OF[robot] if message.to_partner else "responder"
             if message.sender != "partner":  # the other robot's list has it
-                way = (robot, other) if message.sender == "robot" else (other, robot)
-                yield (*way, "message"), message.delivered is not None
+                route = (robot, other_party) if message.sender == "robot" else (other_party, robot)
+                yield (*route, "message"), message.delivered is not None
     calls = [call for _, own in iterate_robots(recording) for call in own.calls]
     names = _name_callees(calls, (each.agent for each in recording.agent_outputs))
     for call in calls:
@@ -64,8 +64,11 @@ def _iterate_messages(recording: Recording) -> Iterator[tuple[tuple[str, str, Me
         yield (caller, callee, "call"), True
         if call.result != "None":  # a logger returns nothing
             yield (callee, caller, "return"), True
-    for each in recording.agent_messages:
-        yield (each.sender, each.receiver, "call" if each.reply_to is None else "return"), True
+    for agent_message in recording.agent_messages:
+        yield (
+            (agent_message.sender, agent_message.receiver, "call" if agent_message.reply_to is None else "return"),
+            True,
+        )
 
 
 def identify_party(name: str) -> str:
@@ -73,47 +76,53 @@ def identify_party(name: str) -> str:
     return name if name in _NAMED else "network"
 
 
-def describe_message_counts(told: tuple[MessageCount, ...], language: Language = ENGLISH) -> str:
+def describe_message_counts(message_counts: tuple[MessageCount, ...], language: Language = ENGLISH) -> str:
     """Return the counts as a sentence; empty if there are none."""
-    counts = ", ".join(_describe_count(each, language) for each in told if each.kind != "return")
+    counts = ", ".join(_describe_count(each, language) for each in message_counts if each.kind != "return")
     return language.say("Messages by sender and receiver: %(counts)s.", counts=counts) if counts else ""
 
 
-def _describe_count(talk: MessageCount, language: Language) -> str:
+def _describe_count(message_count: MessageCount, language: Language) -> str:
     return language.say(
         "%(source)s to %(target)s %(count)s",
-        source=format_party_name(talk.source, language),
-        target=format_party_name(talk.target, language),
-        count=_format_count(talk, language),
+        source=format_party_name(message_count.source, language),
+        target=format_party_name(message_count.target, language),
+        count=_format_count(message_count, language),
     )
 
 
-def build_block_diagram(told: tuple[MessageCount, ...]) -> Diagram:
+def build_block_diagram(message_counts: tuple[MessageCount, ...]) -> Diagram:
     """Return the counts as a block diagram. A call that returned something has an arrow at both ends."""
-    returned = {(talk.source, talk.target) for talk in told if talk.kind == "return"}
+    returned_routes = {(talk.source, talk.target) for talk in message_counts if talk.kind == "return"}
     arrows = tuple(
         DiagramArrow(
             talk.source,
             talk.target,
             _format_count(talk),
-            heads="both" if talk.kind == "call" and (talk.target, talk.source) in returned else "target",
+            heads="both" if talk.kind == "call" and (talk.target, talk.source) in returned_routes else "target",
         )
-        for talk in told
+        for talk in message_counts
         if talk.kind != "return"
     )
-    linked = any({talk.source, talk.target} == {"robot", SECOND} for talk in told)
-    always = ("robot", SECOND) if linked else ("robot", "responder")
-    named = dict.fromkeys((*always, *(name for talk in told for name in (talk.source, talk.target))))
-    return Diagram("blockdiag", tuple(DiagramActor(name, name) for name in named), arrows)
+    is_linked = any({talk.source, talk.target} == {"robot", SECOND} for talk in message_counts)
+    required_parties = ("robot", SECOND) if is_linked else ("robot", "responder")
+    party_names = dict.fromkeys(
+        (*required_parties, *(name for talk in message_counts for name in (talk.source, talk.target)))
+    )
+    return Diagram("blockdiag", tuple(DiagramActor(name, name) for name in party_names), arrows)
 
 
-def build_sequence_diagram(told: SequenceDiagram) -> Diagram:
+def build_sequence_diagram(conversation: SequenceDiagram) -> Diagram:
     """Return the conversation as a sequence diagram, for display beside a notebook's own."""
-    return Diagram("seqdiag", tuple(DiagramActor(party, party) for party in told.parties), tuple(_build_steps(told)))
+    return Diagram(
+        "seqdiag",
+        tuple(DiagramActor(party, party) for party in conversation.parties),
+        tuple(_build_steps(conversation)),
+    )
 
 
-def _build_steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
-    for step in told.steps:
+def _build_steps(conversation: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
+    for step in conversation.steps:
         if not isinstance(step, Step):
             yield Divider(f"{step.count} more {step.what}{'' if step.count == 1 else 's'}", delay=True)
         elif step.kind == "silence":
@@ -131,14 +140,14 @@ def _build_steps(told: SequenceDiagram) -> Iterator[DiagramArrow | Divider]:
 def _name_callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, str]:
     """Return the display name of each called name."""
     networks = dict.fromkeys(call.callee for call in calls if call.callee not in _NAMED)
-    shown = {
+    display_names = {
         name: to_one_line(name, 20) if place < _MOST_NETWORKS else _OTHER_NETWORKS
         for place, name in enumerate(networks)
     }
-    return MappingProxyType(shown | {name: name for name in (*_NAMED, *agents)})
+    return MappingProxyType(display_names | {name: name for name in (*_NAMED, *agents)})
 
 
-def _format_count(talk: MessageCount, language: Language = ENGLISH) -> str:
-    if not talk.lost:
-        return str(talk.count)
-    return language.say("%(count)s, %(lost)s lost", count=talk.count, lost=talk.lost)
+def _format_count(message_count: MessageCount, language: Language = ENGLISH) -> str:
+    if not message_count.lost:
+        return str(message_count.count)
+    return language.say("%(count)s, %(lost)s lost", count=message_count.count, lost=message_count.lost)

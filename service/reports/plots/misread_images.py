@@ -35,19 +35,25 @@ _HEADS = 0.34
 _TEXT = 3 * (_SIDE + _GAP) + 0.08
 
 
-def draw_misread(found: Sequence[MisreadImage], images: int, title: str) -> Figure:
+def draw_misread(misread_images: Sequence[MisreadImage], image_count: int, title: str) -> Figure:
     """Draw at most ``MOST_MISREAD`` rows: the image, and the nearest correct ones of its truth and of its answer."""
-    shown = found[:MOST_MISREAD]
-    height = _ROW * len(shown)
-    count = f"{len(shown)} of {len(found)}" if len(shown) < len(found) else str(len(found))
+    shown_images = misread_images[:MOST_MISREAD]
+    height = _ROW * len(shown_images)
+    count = (
+        f"{len(shown_images)} of {len(misread_images)}"
+        if len(shown_images) < len(misread_images)
+        else str(len(misread_images))
+    )
     figure = create_figure(
-        HEAD + _HEADS + height, title, f"{count} misread of n = {images} images; each: the part that a network receives"
+        HEAD + _HEADS + height,
+        title,
+        f"{count} misread of n = {image_count} images; each: the part that a network receives",
     )
     axes = add_axes(figure, 0.02, 0.0, WIDTH - 0.04, height + _HEADS)
     axes.set_axis_off()
-    for column, head in enumerate(("misread", "correct,\nsame truth", "correct,\nsame answer")):
-        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.5 * _HEADS, head, FAINT, 8, ha="center")
-    for row, item in enumerate(shown):
+    for column, heading in enumerate(("misread", "correct,\nsame truth", "correct,\nsame answer")):
+        _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, -0.5 * _HEADS, heading, FAINT, 8, ha="center")
+    for row, item in enumerate(shown_images):
         _draw_row(axes, item, row * _ROW)
     axes.set_xlim(-0.08, WIDTH - 0.12)
     axes.set_ylim(height, -_HEADS)
@@ -56,11 +62,11 @@ def draw_misread(found: Sequence[MisreadImage], images: int, title: str) -> Figu
 
 def _draw_row(axes: Axes, item: MisreadImage, y: float) -> None:
     _draw_image(axes, item.prediction, 0, y, FAULT, 1.8)
-    for column, other in ((1, item.like_truth), (2, item.like_answer)):
-        if other is None:
+    for column, neighbour in ((1, item.like_truth), (2, item.like_answer)):
+        if neighbour is None:
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE / 2, "none", FAINT, 8, ha="center")
         else:
-            _draw_image(axes, other, column * (_SIDE + _GAP), y, RULE, 0.8)
+            _draw_image(axes, neighbour, column * (_SIDE + _GAP), y, RULE, 0.8)
     lines = [
         (f"{item.number}. ✗ wrong", FAULT, True),
         ("truth:", FAINT, False),
@@ -70,12 +76,12 @@ def _draw_row(axes: Axes, item: MisreadImage, y: float) -> None:
     ]
     line = 0
     for text, colour, bold in lines:
-        for part in textwrap.wrap(text, 16, max_lines=2, placeholder="…") or [""]:
-            _write(axes, _TEXT, y + 0.08 + 0.145 * line, part, colour, 8.2, bold=bold)
+        for text_line in textwrap.wrap(text, 16, max_lines=2, placeholder="…") or [""]:
+            _write(axes, _TEXT, y + 0.08 + 0.145 * line, text_line, colour, 8.2, bold=bold)
             line += 1
-    for column, other in ((1, item.like_truth), (2, item.like_answer)):
-        if other is not None:
-            name = textwrap.shorten(to_one_line(other.truth, 40), 14, placeholder="…")
+    for column, neighbour in ((1, item.like_truth), (2, item.like_answer)):
+        if neighbour is not None:
+            name = textwrap.shorten(to_one_line(neighbour.truth, 40), 14, placeholder="…")
             _write(axes, column * (_SIDE + _GAP) + _SIDE / 2, y + _SIDE + 0.1, name, SAID, 7.2, ha="center")
 
 

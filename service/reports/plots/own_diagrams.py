@@ -46,14 +46,14 @@ def list_own_diagrams(
 
     The events are those of the first trial with messages, preferably a visible one.
     """
-    talking = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
-    talking.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
-    if not talking:
+    talking_trials = [index for index, trial in enumerate(grade.trials) if trial.recording.messages]
+    talking_trials.sort(key=lambda index: is_for_staff(grade.trials[index].visibility))
+    if not talking_trials:
         return tuple(_build_uncompared(cell, language) for cell in cells)
-    compared = _find_closest(grade, cells, talking[0])
+    differences_by_cell = _find_closest(grade, cells, talking_trials[0])
     return tuple(
-        _build_compared(cell, compared[cell.cell], grade, talking[0], language)
-        if cell.cell in compared
+        _build_compared(cell, differences_by_cell[cell.cell], grade, talking_trials[0], language)
+        if cell.cell in differences_by_cell
         else _build_uncompared(cell, language)
         for cell in cells
     )
@@ -66,14 +66,14 @@ def format_cell_title(cell: DiagramCell, language: Language = ENGLISH) -> str:
 
 def _find_closest(grade: Grade, cells: Sequence[DiagramCell], trial: int) -> dict[int, Differences]:
     """Return by cell the diagram of each kind that is closest to the recorded events, the last among equals."""
-    told = count_messages(grade.trials[trial].recording)
-    best: dict[DiagramKind, tuple[int, Differences]] = {}
+    message_counts = count_messages(grade.trials[trial].recording)
+    best_matches: dict[DiagramKind, tuple[int, Differences]] = {}
     for cell in cells:
-        found = compare_with_recording(cell.diagram, told)
-        before = best.get(cell.diagram.kind)
-        if found is not None and (before is None or found.similarity >= before[1].similarity):
-            best[cell.diagram.kind] = (cell.cell, found)
-    return dict(best.values())
+        differences = compare_with_recording(cell.diagram, message_counts)
+        earlier_match = best_matches.get(cell.diagram.kind)
+        if differences is not None and (earlier_match is None or differences.similarity >= earlier_match[1].similarity):
+            best_matches[cell.diagram.kind] = (cell.cell, differences)
+    return dict(best_matches.values())
 
 
 def _build_uncompared(cell: DiagramCell, language: Language) -> OwnDiagram:
@@ -82,26 +82,33 @@ def _build_uncompared(cell: DiagramCell, language: Language) -> OwnDiagram:
     return OwnDiagram(cell, None, title, "", (plot,))
 
 
-def _build_compared(cell: DiagramCell, found: Differences, grade: Grade, index: int, language: Language) -> OwnDiagram:
+def _build_compared(
+    cell: DiagramCell, differences: Differences, grade: Grade, index: int, language: Language
+) -> OwnDiagram:
     say = language.say
     trial = grade.trials[index]
     name = f"cell-{cell.cell}-{build_trial_name(trial)}"
-    title, words, where = (
+    title, description, trial_name = (
         format_cell_title(cell, language),
-        describe_differences(found, language),
+        describe_differences(differences, language),
         format_trial_name(trial, language),
     )
-    drawn, happened = say("The diagram in the notebook."), say("The events recorded in %(trial)s.", trial=where)
-    if found.drawn_actors or found.drawn_arrows:
-        drawn += " " + say("✗: drawn, but did not happen.")
-    if found.happened_actors or found.happened_arrows:
-        happened += " " + say("+: happened, but is not drawn.")
-    beside = say("The same diagram of the events in %(trial)s.", trial=where)
-    plots = (
-        Plot(f"own-{name}", "own", index, "", title, drawn, f"{_format_alt_text(cell, language)} {words}"),
-        Plot(f"happened-{name}", "happened", index, "", say("Events"), happened, f"{beside} {words}"),
+    drawn_caption, happened_caption = (
+        say("The diagram in the notebook."),
+        say("The events recorded in %(trial)s.", trial=trial_name),
     )
-    return OwnDiagram(cell, found, title, words, plots)
+    if differences.drawn_actors or differences.drawn_arrows:
+        drawn_caption += " " + say("✗: drawn, but did not happen.")
+    if differences.happened_actors or differences.happened_arrows:
+        happened_caption += " " + say("+: happened, but is not drawn.")
+    alt_text = say("The same diagram of the events in %(trial)s.", trial=trial_name)
+    plots = (
+        Plot(
+            f"own-{name}", "own", index, "", title, drawn_caption, f"{_format_alt_text(cell, language)} {description}"
+        ),
+        Plot(f"happened-{name}", "happened", index, "", say("Events"), happened_caption, f"{alt_text} {description}"),
+    )
+    return OwnDiagram(cell, differences, title, description, plots)
 
 
 def _format_alt_text(cell: DiagramCell, language: Language) -> str:

@@ -86,17 +86,17 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     recording = trial.recording
     points = _collect_points(recording)
     partner = recording.partner
-    partners = _collect_points(partner) if partner is not None else points[:0]
-    everywhere = np.vstack((points, partners))
-    view = _choose_viewport(recording, everywhere)
+    partner_points = _collect_points(partner) if partner is not None else points[:0]
+    all_points = np.vstack((points, partner_points))
+    view = _choose_viewport(recording, all_points)
     plot_width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     plot_height = plot_width * view.height / view.width
     handles = _build_legend(recording, view)
-    located = view.width < FLOOR_WIDTH
+    has_locator = view.width < FLOOR_WIDTH
     legend_rows = -(-len(handles) // _LEGEND_COLUMNS)
-    foot = 0.42 + max(0.62 if located else 0.0, 0.17 * legend_rows + 0.04)
-    figure = create_figure(HEAD + plot_height + foot, title, _format_subtitle(trial))
-    axes = add_axes(figure, _LEFT_EDGE, foot, plot_width, plot_height)
+    foot_height = 0.42 + max(0.62 if has_locator else 0.0, 0.17 * legend_rows + 0.04)
+    figure = create_figure(HEAD + plot_height + foot_height, title, _format_subtitle(trial))
+    axes = add_axes(figure, _LEFT_EDGE, foot_height, plot_width, plot_height)
     axes.set_xlim(view.left, view.right)
     axes.set_ylim(view.bottom, view.top)
     axes.set_facecolor(_OFF_THE_FLOOR)
@@ -105,7 +105,7 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
     _draw_beacon(axes, recording)
     per_inch = view.width / plot_width  # mm
     if partner is not None:
-        _draw_robot_path(axes, partner, partners, per_inch, SECOND_ROBOT)
+        _draw_robot_path(axes, partner, partner_points, per_inch, SECOND_ROBOT)
     _draw_robot_path(axes, recording, points, per_inch, LEFT)
     axes.set_xlabel("x, mm", font=load_font(8.5), labelpad=1)
     axes.set_ylabel("y, mm", font=load_font(8.5), labelpad=1)
@@ -113,11 +113,11 @@ def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
         handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_LEGEND_COLUMNS, prop=load_font(8),
         frameon=False, handletextpad=0.5, columnspacing=0.9, labelspacing=0.35, borderaxespad=0.3,
     )  # fmt: skip
-    if _has_points_outside(everywhere, view):
+    if _has_points_outside(all_points, view):
         axes.text(0.5, 0.03, "the path continues outside this image", transform=axes.transAxes, ha="center",
                   font=load_font(7.5, bold=True), color=INK, zorder=9,
                   bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
-    if located:
+    if has_locator:
         _draw_locator(figure, floor, view)
     return figure
 
@@ -142,15 +142,15 @@ def _collect_points(recording: Recording) -> NDArray[np.float64]:
 
 def _choose_viewport(recording: Recording, points: NDArray[np.float64]) -> Viewport:
     reach = get_recorded_robot(recording).reach
-    places = points[:, :2] if recording.beacon is None else np.vstack((points[:, :2], [recording.beacon]))
-    low_x, low_y = (float(value) for value in places.min(axis=0))
-    high_x, high_y = (float(value) for value in places.max(axis=0))
+    positions = points[:, :2] if recording.beacon is None else np.vstack((points[:, :2], [recording.beacon]))
+    low_x, low_y = (float(value) for value in positions.min(axis=0))
+    high_x, high_y = (float(value) for value in positions.max(axis=0))
     margin = max(_MARGIN, reach + 15)
     view = Viewport(low_x - margin, low_y - margin, high_x + margin, high_y + margin)
     if view.width > _WHOLE_FLOOR_SHARE * FLOOR_WIDTH or view.height > 0.8 * FLOOR_HEIGHT:
         ends = points[[0, -1], :2]
-        around = np.vstack((places - 60, places + 60, ends - reach - 15, ends + reach + 15))
-        (low_x, low_y), (high_x, high_y) = around.min(axis=0), around.max(axis=0)
+        extent_points = np.vstack((positions - 60, positions + 60, ends - reach - 15, ends + reach + 15))
+        (low_x, low_y), (high_x, high_y) = extent_points.min(axis=0), extent_points.max(axis=0)
         view = Viewport(min(0.0, low_x), min(0.0, low_y), max(FLOOR_WIDTH, high_x), max(FLOOR_HEIGHT, high_y))
     left, right = max(view.left, -_BEYOND), min(view.right, FLOOR_WIDTH + _BEYOND)
     bottom, top = max(view.bottom, -_BEYOND), min(view.top, FLOOR_HEIGHT + _BEYOND)
@@ -177,14 +177,16 @@ def draw_floor_part(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
     if left >= right or top >= bottom:
         return
     step = 2 if right - left > 1300 else 1
-    part = floor[top:bottom, left:right].astype(np.float32)
-    part = part[: part.shape[0] // step * step, : part.shape[1] // step * step]
-    part = part.reshape(part.shape[0] // step, step, part.shape[1] // step, step, 3).mean(axis=(1, 3))
+    floor_pixels = floor[top:bottom, left:right].astype(np.float32)
+    floor_pixels = floor_pixels[: floor_pixels.shape[0] // step * step, : floor_pixels.shape[1] // step * step]
+    floor_pixels = floor_pixels.reshape(
+        floor_pixels.shape[0] // step, step, floor_pixels.shape[1] // step, step, 3
+    ).mean(axis=(1, 3))
     # Lightened, so that a path over black stays visible and printing saves ink.
-    faded = np.rint(72 + part * (183 / 255)).astype(np.uint8)
+    light_pixels = np.rint(72 + floor_pixels * (183 / 255)).astype(np.uint8)
     axes.imshow(
-        faded,
-        extent=(left, left + faded.shape[1] * step, rows - top - faded.shape[0] * step, rows - top),
+        light_pixels,
+        extent=(left, left + light_pixels.shape[1] * step, rows - top - light_pixels.shape[0] * step, rows - top),
         interpolation="nearest",
         aspect="auto",
         zorder=0,
@@ -215,8 +217,10 @@ def _draw_robot_path(
 
 
 def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], colour: str) -> None:
-    for first, last in _list_pen_strokes(recording, len(points)):
-        axes.plot(points[first:last, 0], points[first:last, 1], color=PEN, linewidth=5.5, solid_capstyle="round")
+    for start_row, end_row in _list_pen_strokes(recording, len(points)):
+        axes.plot(
+            points[start_row:end_row, 0], points[start_row:end_row, 1], color=PEN, linewidth=5.5, solid_capstyle="round"
+        )
     axes.plot(points[:, 0], points[:, 1], color="white", linewidth=3.2, solid_capstyle="round")
     axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.5, solid_capstyle="round")
     for index in _select_even_rows(points, 10):
@@ -230,25 +234,25 @@ def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], c
 def _list_pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
     """Return the row ranges of the path with the pen down."""
     strokes: list[tuple[int, int]] = []
-    since: int | None = None
-    for tick, down in (*recording.pen, (count, False)):
-        if down and since is None:
-            since = tick
-        elif not down and since is not None:
-            strokes.append((max(0, since), min(count, tick + 1)))
-            since = None
+    start_tick: int | None = None
+    for tick, is_down in (*recording.pen, (count, False)):
+        if is_down and start_tick is None:
+            start_tick = tick
+        elif not is_down and start_tick is not None:
+            strokes.append((max(0, start_tick), min(count, tick + 1)))
+            start_tick = None
     return [(first, last) for first, last in strokes if last - first > 1]
 
 
-def _select_even_rows(points: NDArray[np.float64], wanted: int) -> list[int]:
+def _select_even_rows(points: NDArray[np.float64], max_count: int) -> list[int]:
     """Return rows at even intervals of distance and turning, without the first and last."""
     steps = np.hypot(np.diff(points[:, 0]), np.diff(points[:, 1])) + 0.8 * np.abs(np.diff(points[:, 2]))
-    travelled = np.concatenate(([0.0], np.cumsum(steps)))
-    count = min(wanted, int(travelled[-1] // 60))
+    distances = np.concatenate(([0.0], np.cumsum(steps)))
+    count = min(max_count, int(distances[-1] // 60))
     if count < 1:
         return []
-    goals = travelled[-1] * (np.arange(count) + 0.5) / count
-    return sorted({int(row) for row in np.searchsorted(travelled, goals)} - {0, len(points) - 1})
+    target_distances = distances[-1] * (np.arange(count) + 0.5) / count
+    return sorted({int(row) for row in np.searchsorted(distances, target_distances)} - {0, len(points) - 1})
 
 
 def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -> None:
@@ -326,9 +330,11 @@ def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
     if floor is not None:
-        small = floor[::6, ::6].astype(np.float32)
+        small_floor = floor[::6, ::6].astype(np.float32)
         axes.imshow(
-            np.rint(72 + small * (183 / 255)).astype(np.uint8), extent=(0, FLOOR_WIDTH, 0, FLOOR_HEIGHT), aspect="auto"
+            np.rint(72 + small_floor * (183 / 255)).astype(np.uint8),
+            extent=(0, FLOOR_WIDTH, 0, FLOOR_HEIGHT),
+            aspect="auto",
         )
     axes.add_patch(
         Rectangle((view.left, view.bottom), view.width, view.height, facecolor="none", edgecolor=FAULT, linewidth=1.4)

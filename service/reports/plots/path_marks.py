@@ -34,29 +34,31 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
     ``points`` are x, y in mm and the heading in degrees, row by row. An inch of the plot shows ``per_inch`` mm.
     """
     ends = ((recording.start.x, recording.start.y), (recording.end.x, recording.end.y))
-    taken = [end for end in ends if math.isfinite(sum(end))]
+    occupied_points = [end for end in ends if math.isfinite(sum(end))]
     step = next((s for s in (1, 2, 5, 10, 20, 50, 100, 200) if recording.end_t / s <= 9), 500)
     for second in range(step, math.ceil(recording.end_t), step):
         row = count_ticks_until(recording, second)
         if row >= len(points):
             break
         x, y = float(points[row, 0]), float(points[row, 1])
-        if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in taken):
+        if any(math.hypot(x - other[0], y - other[1]) < 0.33 * per_inch for other in occupied_points):
             continue
-        taken.append((x, y))
+        occupied_points.append((x, y))
         axes.plot([x], [y], "o", markersize=3, color="white", markeredgecolor=colour, markeredgewidth=0.9, zorder=5)
         text = f"{second} s"
         # On the robot's right, and for the second robot on its left, because both may drive the same way.
         angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
-        sides = [
+        candidates = [
             (x + way * _FROM_PATH[0] * per_inch * math.cos(angle), y + way * _FROM_PATH[1] * per_inch * math.sin(angle))
             for way in (1, -1)
         ]
-        fitting = [
-            side for side in sides if _is_in_view(axes, *side, text, per_inch) and _is_clear(side, recording, per_inch)
+        free_positions = [
+            side
+            for side in candidates
+            if _is_in_view(axes, *side, text, per_inch) and _is_clear(side, recording, per_inch)
         ]
-        if fitting:
-            _draw_tag(axes, *fitting[0], text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
+        if free_positions:
+            _draw_tag(axes, *free_positions[0], text, _TIME_SIZE, colour if colour == SECOND_ROBOT else INK)
 
 
 def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -> None:
@@ -76,23 +78,23 @@ def draw_marks(axes: Axes, recording: Recording, per_inch: float, colour: str) -
 
 def _draw_images(axes: Axes, recording: Recording, per_inch: float) -> None:
     sensor = get_recorded_robot(recording).left_light
-    places: dict[tuple[int, int], list[int]] = {}
+    numbers_by_place: dict[tuple[int, int], list[int]] = {}
     for count, image in enumerate(recording.images, start=1):
         x, y = to_world(image.pose, sensor.x, sensor.y)
-        places.setdefault((round(x / 8), round(y / 8)), []).append(count)
+        numbers_by_place.setdefault((round(x / 8), round(y / 8)), []).append(count)
         corner = (x - image.side / 2, y - image.side / 2)
         for edge, width in (("white", 2.4), (INK, 1.2)):
             axes.add_patch(
                 Rectangle(corner, image.side, image.side, facecolor="none", edgecolor=edge, linewidth=width, zorder=6)
             )
-    numbered: list[tuple[float, float]] = []
+    tag_positions: list[tuple[float, float]] = []
     # The last one first, so that its number is kept if places are too close together.
-    for (column, row), counts in reversed(places.items()):
+    for (column, row), counts in reversed(numbers_by_place.items()):
         text = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
         x, y = column * 8.0, row * 8 + 10 + 0.10 * per_inch
-        apart = 2 * _estimate_half_width(text) * per_inch
-        if all(abs(x - other[0]) > apart or abs(y - other[1]) > _LINE * per_inch for other in numbered):
-            numbered.append((x, y))
+        min_distance = 2 * _estimate_half_width(text) * per_inch
+        if all(abs(x - other[0]) > min_distance or abs(y - other[1]) > _LINE * per_inch for other in tag_positions):
+            tag_positions.append((x, y))
             _draw_tag(axes, x, y, text, _NUMBER_SIZE)
 
 
@@ -101,9 +103,9 @@ def _estimate_half_width(text: str) -> float:
     return 0.032 * len(text) + 0.03
 
 
-def _is_clear(place: tuple[float, float], recording: Recording, per_inch: float) -> bool:
+def _is_clear(position: tuple[float, float], recording: Recording, per_inch: float) -> bool:
     """Return whether a time at this place would not overlap a touch."""
-    return all(math.dist(place, (touch.pose.x, touch.pose.y)) > 0.26 * per_inch for touch in recording.touches[:40])
+    return all(math.dist(position, (touch.pose.x, touch.pose.y)) > 0.26 * per_inch for touch in recording.touches[:40])
 
 
 def _is_in_view(axes: Axes, x: float, y: float, text: str, per_inch: float) -> bool:

@@ -44,10 +44,10 @@ class Plot:
     alt: str
 
 
-def format_title(what: str) -> str:
+def format_title(text: str) -> str:
     """Return a plot's title, short enough for a phone."""
-    shown = to_one_line(what, 28)
-    return shown[:1].upper() + shown[1:]
+    title = to_one_line(text, 28)
+    return title[:1].upper() + title[1:]
 
 
 def build_trial_name(trial: TrialResult) -> str:

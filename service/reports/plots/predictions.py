@@ -38,51 +38,59 @@ _COLUMNS = 2
 
 def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
     """Draw cards of at most ``MOST_PREDICTIONS`` images, wrong answers first if not all fit."""
-    shown = select_predictions(predictions)
-    rows = -(-len(shown) // _COLUMNS)
+    shown_indices = select_predictions(predictions)
+    rows = -(-len(shown_indices) // _COLUMNS)
     height = rows * _CARD_HEIGHT
-    figure = create_figure(HEAD + height + 0.06, title, _format_subtitle(predictions, shown))
+    figure = create_figure(HEAD + height + 0.06, title, _format_subtitle(predictions, shown_indices))
     axes = add_axes(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
     axes.set_axis_off()
-    for place, number in enumerate(shown):
-        x, y = place % _COLUMNS * _CARD_WIDTH, place // _COLUMNS * _CARD_HEIGHT
+    for position, number in enumerate(shown_indices):
+        x, y = position % _COLUMNS * _CARD_WIDTH, position // _COLUMNS * _CARD_HEIGHT
         _draw_card(axes, predictions[number], number + 1, x, y)
     axes.set_xlim(-0.08, WIDTH - 0.12)
     axes.set_ylim(height, -0.06)
     return figure
 
 
-def _format_subtitle(predictions: Sequence[Prediction], shown: Sequence[int]) -> str:
-    wrong = sum(not is_right(prediction) for prediction in predictions)
+def _format_subtitle(predictions: Sequence[Prediction], shown_indices: Sequence[int]) -> str:
+    wrong_count = sum(not is_right(prediction) for prediction in predictions)
     count = (
-        f"{len(predictions)} images" if len(shown) == len(predictions) else f"{len(shown)} of {len(predictions)} images"
+        f"{len(predictions)} images"
+        if len(shown_indices) == len(predictions)
+        else f"{len(shown_indices)} of {len(predictions)} images"
     )
-    return f"{count}, {wrong} with a wrong answer; each: whole 20×20 image, then its 14×14 part"
+    return f"{count}, {wrong_count} with a wrong answer; each: whole 20×20 image, then its 14×14 part"
 
 
 def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
-    right = is_right(prediction)
-    whole, focus = np.asarray(to_rgb_image(prediction.image)), np.asarray(crop_focus(prediction.image))
-    _draw_image(axes, whole, x, y)
-    _draw_image(axes, np.repeat(focus[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
+    is_correct = is_right(prediction)
+    full_image, focus_image = np.asarray(to_rgb_image(prediction.image)), np.asarray(crop_focus(prediction.image))
+    _draw_image(axes, full_image, x, y)
+    _draw_image(axes, np.repeat(focus_image[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
     if prediction.image.side == 20:
         pixel = _SIDE / 20
         axes.add_patch(
             Rectangle((x + FOCUS[0] * pixel, y + FOCUS[1] * pixel), 14 * pixel, 14 * pixel, facecolor="none",
                       edgecolor=INK, linewidth=0.9, linestyle=(0, (2.5, 1.5)))
         )  # fmt: skip
-    colour = SAID if right else FAULT
-    if not right:
+    colour = SAID if is_correct else FAULT
+    if not is_correct:
         axes.add_patch(
             Rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, facecolor="none", edgecolor=colour,
                       linewidth=1.8)
         )  # fmt: skip
-    sign, word = ("✓", "correct") if right else ("✗", "wrong")
+    sign, verdict = ("✓", "correct") if is_correct else ("✗", "wrong")
     answer = "no answer" if prediction.answer is None else to_one_line(prediction.answer, 30)
-    told = f"answer: {answer}" if prediction.answer is not None else answer
-    said = [to_one_line(prediction.truth, 40)] if right else [told, f"truth: {to_one_line(prediction.truth, 40)}"]
-    lines = [(f"{number}. {sign} {word}", colour, True)]
-    lines += [(line, INK, False) for text in said for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")]
+    answer_text = f"answer: {answer}" if prediction.answer is not None else answer
+    captions = (
+        [to_one_line(prediction.truth, 40)]
+        if is_correct
+        else [answer_text, f"truth: {to_one_line(prediction.truth, 40)}"]
+    )
+    lines = [(f"{number}. {sign} {verdict}", colour, True)]
+    lines += [
+        (line, INK, False) for text in captions for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")
+    ]
     for row, (text, shade, bold) in enumerate(lines):
         axes.text(
             x, y + _SIDE + 0.08 + 0.142 * row, replace_missing_glyphs(text), color=shade,

@@ -74,22 +74,22 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
     recording = trial.recording
     panels, strips = build_panels(recording), build_strips(recording)
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
-    body = sum(each.panel.height + _GAP for each in panels)
-    figure = create_figure(HEAD + strip_height + body + 0.36, title, _format_subtitle(trial))
+    body_height = sum(each.panel.height + _GAP for each in panels)
+    figure = create_figure(HEAD + strip_height + body_height + 0.36, title, _format_subtitle(trial))
     end = max(recording.end_t, tick_to_seconds(recording, len(recording.ticks)), 0.1)
     top = float(figure.get_size_inches()[1]) - HEAD
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     if strips:
         top -= strip_height
         _draw_strips(add_axes(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
-    for number, each in enumerate(panels):
-        height = each.panel.height
+    for number, panel in enumerate(panels):
+        height = panel.panel.height
         top -= height + _GAP
         axes = add_axes(figure, _LEFT_EDGE, top, width, height)
-        write_text(figure, _LEFT_EDGE, top + height + 0.045, each.panel.title, size=8, bold=True)
-        _draw_panel(axes, each, recording.ticks.t, end)
-        if len(each.curves) > 1:
-            _label_curves(figure, each, top + height + 0.045)
+        write_text(figure, _LEFT_EDGE, top + height + 0.045, panel.panel.title, size=8, bold=True)
+        _draw_panel(axes, panel, recording.ticks.t, end)
+        if len(panel.curves) > 1:
+            _label_curves(figure, panel, top + height + 0.045)
         if number < len(panels) - 1:
             axes.tick_params(labelbottom=False)
         else:
@@ -99,25 +99,25 @@ def draw_sensors(trial: TrialResult, title: str) -> Figure:
 
 def build_panels(recording: Recording) -> tuple[ReadingPanel, ...]:
     """Return the panels for ``draw_sensors``, top to bottom."""
-    told = recording.ticks.to_displayed_columns()
+    displayed_columns = recording.ticks.to_displayed_columns()
     curves: dict[Panel, list[ReadingCurve]] = {}
     for column in COLUMNS:
         if column.panel is not None:
-            values = told[column.display_attribute]
-            shown = values if values.ndim == 1 else values[:, 0]
-            curves.setdefault(column.panel, []).append(ReadingCurve(column.label, shown / column.panel.per))
-    ordered = sorted(curves, key=lambda panel: panel.rank)
-    return tuple(ReadingPanel(panel, tuple(curves[panel])) for panel in ordered)
+            values = displayed_columns[column.display_attribute]
+            curve_values = values if values.ndim == 1 else values[:, 0]
+            curves.setdefault(column.panel, []).append(ReadingCurve(column.label, curve_values / column.panel.per))
+    sorted_panels = sorted(curves, key=lambda panel: panel.rank)
+    return tuple(ReadingPanel(panel, tuple(curves[panel])) for panel in sorted_panels)
 
 
 def build_strips(recording: Recording) -> tuple[Strip, ...]:
     """Return the kinds of events that occurred, with their times in seconds."""
     answers = [m for m in recording.messages if m.sender == "responder"]
-    heard = [m for m in recording.messages if m.sender == "partner"]
+    partner_messages = [m for m in recording.messages if m.sender == "partner"]
     strips = (
         Strip("sent", tuple(m.t for m in recording.messages if m.sender == "robot"), ">", LEFT),
         Strip("answer", tuple(m.delivered for m in answers if m.delivered is not None), "<", RIGHT),
-        Strip("heard", tuple(m.delivered for m in heard if m.delivered is not None), "<", SECOND_ROBOT),
+        Strip("heard", tuple(m.delivered for m in partner_messages if m.delivered is not None), "<", SECOND_ROBOT),
         Strip("said", tuple(line.t for line in recording.spoken), "o", SAID),
         Strip("touch", tuple(touch.t for touch in recording.touches), "D", FAULT),
         Strip("fault", tuple(fault.t for fault in recording.faults), "X", FAULT),
@@ -177,8 +177,8 @@ def _compute_limits(panel: ReadingPanel) -> tuple[float, float]:
     least = max(10.0, 1e-6 * max(abs(low), abs(high)))
     if high - low < least:
         low, high = (low + high - least) / 2, (low + high + least) / 2
-    room = 0.08 * (high - low)
-    return low - room, high + room
+    margin = 0.08 * (high - low)
+    return low - margin, high + margin
 
 
 def _clip_readings(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -186,9 +186,9 @@ def _clip_readings(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _label_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
-    right = WIDTH - _RIGHT_EDGE
+    right_edge = WIDTH - _RIGHT_EDGE
     width, height = figure.get_size_inches()
-    for curve, text_x, colour in zip(panel.curves, (right - 0.86, right - 0.30), (LEFT, RIGHT), strict=True):
+    for curve, text_x, colour in zip(panel.curves, (right_edge - 0.86, right_edge - 0.30), (LEFT, RIGHT), strict=True):
         write_text(figure, text_x, y, curve.label, size=8, colour=INK)
         ends = [(text_x - 0.25) / width, (text_x - 0.05) / width]
         line = Line2D(ends, [(y + 0.045) / height] * 2, color=colour, linewidth=1.5)

@@ -49,8 +49,8 @@ def to_rgb_image(image: Image) -> Pixels.Image:
 
 def crop_focus(image: Image) -> Pixels.Image:
     """Return the greyscale crop that a network gets. Sensors of a size other than 20 are shown whole."""
-    whole = to_rgb_image(image).convert("L")
-    return whole.crop(FOCUS) if image.side == 20 else whole
+    grey_image = to_rgb_image(image).convert("L")
+    return grey_image.crop(FOCUS) if image.side == 20 else grey_image
 
 
 def find_misread(predictions: Sequence[Prediction]) -> tuple[MisreadImage, ...]:
@@ -58,22 +58,29 @@ def find_misread(predictions: Sequence[Prediction]) -> tuple[MisreadImage, ...]:
 
     Neighbours are searched only for the images that are drawn.
     """
-    wrong = [
+    wrong_predictions = [
         (number, prediction)
         for number, prediction in enumerate(predictions, start=1)
         if prediction.answer is not None and not is_right(prediction)
     ]
-    greys = [(prediction, _to_greys(prediction)) for prediction in predictions if is_right(prediction)] if wrong else []
-    drawn = (
+    greys = (
+        [(prediction, _to_greys(prediction)) for prediction in predictions if is_right(prediction)]
+        if wrong_predictions
+        else []
+    )
+    compared_images = (
         MisreadImage(
             number,
             prediction,
             _find_nearest(prediction, prediction.truth, greys),
             _find_nearest(prediction, prediction.answer, greys),
         )
-        for number, prediction in wrong[:MOST_MISREAD]
+        for number, prediction in wrong_predictions[:MOST_MISREAD]
     )
-    return (*drawn, *(MisreadImage(number, prediction, None, None) for number, prediction in wrong[MOST_MISREAD:]))
+    return (
+        *compared_images,
+        *(MisreadImage(number, prediction, None, None) for number, prediction in wrong_predictions[MOST_MISREAD:]),
+    )
 
 
 def _to_greys(prediction: Prediction) -> NDArray[np.float64]:
@@ -83,6 +90,12 @@ def _to_greys(prediction: Prediction) -> NDArray[np.float64]:
 def _find_nearest(
     prediction: Prediction, label: str | None, greys: Sequence[tuple[Prediction, NDArray[np.float64]]]
 ) -> Prediction | None:
-    own = _to_greys(prediction)
-    alike = [(prediction, grey) for prediction, grey in greys if prediction.truth == label and grey.shape == own.shape]
-    return min(alike, key=lambda pair: float(((pair[1] - own) ** 2).sum()), default=(None, own))[0]
+    target_pixels = _to_greys(prediction)
+    candidates = [
+        (prediction, grey)
+        for prediction, grey in greys
+        if prediction.truth == label and grey.shape == target_pixels.shape
+    ]
+    return min(
+        candidates, key=lambda pair: float(((pair[1] - target_pixels) ** 2).sum()), default=(None, target_pixels)
+    )[0]

@@ -88,25 +88,25 @@ def build_conversation(
     exchanges = [exchange for robot, own in iterate_robots(recording) for exchange in _iterate_exchanges(own, robot)]
     if recording.partner is not None:
         exchanges.sort(key=lambda exchange: exchange.begin)
-    kept = _select_exchanges(exchanges, most_exchanges, most_steps)
-    timed: list[tuple[float, int, list[Step | Gap]]] = []
-    skipped = 0
+    kept_exchanges = _select_exchanges(exchanges, most_exchanges, most_steps)
+    timed_steps: list[tuple[float, int, list[Step | Gap]]] = []
+    skipped_count = 0
     for number, exchange in enumerate(exchanges):
-        if number not in kept:
-            skipped += 1
+        if number not in kept_exchanges:
+            skipped_count += 1
             continue
-        if skipped:
-            timed.append((exchange.begin, number, [Gap(skipped)]))
-            skipped = 0
-        timed += [(t, number, list(steps)) for t, steps in _build_steps(exchange)]
-    steps = [step for _, _, group in sorted(timed, key=lambda item: item[0]) for step in group]
-    if skipped:
-        steps.append(Gap(skipped))
-    named = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
-    always = ("robot", "responder") if recording.partner is None else ("robot", SECOND)
+        if skipped_count:
+            timed_steps.append((exchange.begin, number, [Gap(skipped_count)]))
+            skipped_count = 0
+        timed_steps += [(t, number, list(steps)) for t, steps in _build_steps(exchange)]
+    steps = [step for _, _, group in sorted(timed_steps, key=lambda item: item[0]) for step in group]
+    if skipped_count:
+        steps.append(Gap(skipped_count))
+    named_parties = {name for step in steps if isinstance(step, Step) for name in (step.source, step.target)}
+    required_parties = ("robot", "responder") if recording.partner is None else ("robot", SECOND)
     lanes = (*PARTIES, *(each.agent for each in recording.agent_outputs if each.agent not in _KNOWN_PARTIES))
-    parties = tuple(party for party in lanes if party in named or party in always)
-    return SequenceDiagram(parties, tuple(steps), len(kept), len(exchanges))
+    parties = tuple(party for party in lanes if party in named_parties or party in required_parties)
+    return SequenceDiagram(parties, tuple(steps), len(kept_exchanges), len(exchanges))
 
 
 def has_problem(message: Message) -> bool:
@@ -119,49 +119,51 @@ def _iterate_exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
     messages = recording.messages
     answers: dict[int, list[int]] = {}
     for index, message in enumerate(messages):
-        to = message.reply_to
-        if message.sender == "responder" and to is not None and 0 <= to < len(messages):
-            answers.setdefault(to, []).append(index)
-    answered = {answer for found in answers.values() for answer in found}
+        replied_index = message.reply_to
+        if message.sender == "responder" and replied_index is not None and 0 <= replied_index < len(messages):
+            answers.setdefault(replied_index, []).append(index)
+    answered_indices = {answer for found in answers.values() for answer in found}
     for index, message in enumerate(messages):
-        if index in answered or message.sender == "partner":
+        if index in answered_indices or message.sender == "partner":
             continue
-        sent = message.sender == "robot"
-        own = _Exchange(index, tuple(answers.get(index, ())), recording, robot)
-        yield own if sent else _Exchange(None, (index,), recording, robot)
+        is_from_robot = message.sender == "robot"
+        exchange = _Exchange(index, tuple(answers.get(index, ())), recording, robot)
+        yield exchange if is_from_robot else _Exchange(None, (index,), recording, robot)
 
 
 def _select_exchanges(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
-    wrong = [number for number, exchange in enumerate(exchanges) if _has_failed(exchange)]
-    half = most_exchanges - most_exchanges // 2
-    first = range(min(half, len(exchanges)))
-    order = dict.fromkeys([*first, *_iterate_recovered(exchanges, wrong), *wrong, *range(len(exchanges))])
-    kept: set[int] = set()
-    steps = 0
+    failed_exchanges = [number for number, exchange in enumerate(exchanges) if _has_failed(exchange)]
+    half_count = most_exchanges - most_exchanges // 2
+    first_exchanges = range(min(half_count, len(exchanges)))
+    order = dict.fromkeys(
+        [*first_exchanges, *_iterate_recovered(exchanges, failed_exchanges), *failed_exchanges, *range(len(exchanges))]
+    )
+    kept_exchanges: set[int] = set()
+    step_count = 0
     for number in list(order)[:most_exchanges]:
-        steps += sum(len(told) for _, told in _build_steps(exchanges[number]))
-        if kept and steps > most_steps:
+        step_count += sum(len(told) for _, told in _build_steps(exchanges[number]))
+        if kept_exchanges and step_count > most_steps:
             break
-        kept.add(number)
-    return kept
+        kept_exchanges.add(number)
+    return kept_exchanges
 
 
-def _iterate_recovered(exchanges: Sequence[_Exchange], wrong: Sequence[int]) -> Iterator[int]:
+def _iterate_recovered(exchanges: Sequence[_Exchange], failed_exchanges: Sequence[int]) -> Iterator[int]:
     """Yield the exchanges in which a text got through that was lost before."""
-    astray: set[str] = set()
-    failed = set(wrong)
+    lost_texts: set[str] = set()
+    failed_numbers = set(failed_exchanges)
     for number, exchange in enumerate(exchanges):
         text = next(exchange.messages).text if exchange.sent is not None else ""
-        if number in failed:
-            astray.add(text)
-        elif text in astray:
-            astray.discard(text)
+        if number in failed_numbers:
+            lost_texts.add(text)
+        elif text in lost_texts:
+            lost_texts.discard(text)
             yield number
 
 
 def _has_failed(exchange: _Exchange) -> bool:
-    unanswered = not exchange.answers and not next(exchange.messages).to_partner
-    return unanswered or any(has_problem(message) for message in exchange.messages)
+    is_unanswered = not exchange.answers and not next(exchange.messages).to_partner
+    return is_unanswered or any(has_problem(message) for message in exchange.messages)
 
 
 def _build_steps(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]]:
@@ -171,10 +173,10 @@ def _build_steps(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]
         message = recording.messages[exchange.sent]
         steps: list[Step | Gap] = [_build_message_step(message, robot)]
         if message.delivered is not None and not message.to_partner:
-            made = list(iterate_inner_steps(recording, exchange.sent))
-            steps += made[:MOST_CALL_STEPS]
-            if len(made) > MOST_CALL_STEPS:
-                steps.append(Gap(len(made) - MOST_CALL_STEPS, "step"))
+            inner_steps = list(iterate_inner_steps(recording, exchange.sent))
+            steps += inner_steps[:MOST_CALL_STEPS]
+            if len(inner_steps) > MOST_CALL_STEPS:
+                steps.append(Gap(len(inner_steps) - MOST_CALL_STEPS, "step"))
             if not exchange.answers:
                 steps.append(Step("silence", "responder", robot, "– no answer –"))
         yield message.t, steps
@@ -184,31 +186,36 @@ def _build_steps(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]
 
 
 def _build_message_step(message: Message, robot: str) -> Step:
-    sent = message.sender == "robot"
-    other = PARTNER_OF[robot] if message.to_partner else "responder"
-    source, target = (robot, other) if sent else (other, robot)
+    is_from_robot = message.sender == "robot"
+    other_party = PARTNER_OF[robot] if message.to_partner else "responder"
+    source, target = (robot, other_party) if is_from_robot else (other_party, robot)
     label, note = abbreviate_message(message.text, 90), describe_loss(message)
     reach = describe_reach(message)
     label = f"{label} ({reach})" if reach else label
     if message.delivered is None:
         return Step("lost", source, target, label, message.t, note or "not delivered")
-    return Step("message", source, target, label, message.t if sent else message.delivered, note)
+    return Step("message", source, target, label, message.t if is_from_robot else message.delivered, note)
 
 
 def iterate_inner_steps(recording: Recording, message: int) -> Iterator[Step]:
     """Yield the calls and agent messages until the robot's message was answered; for -1, those before any message."""
     calls = sorted((call for call in recording.calls if call.message == message), key=_position_of)
-    told, shown_at = 0, recording.messages[message].t if message >= 0 else 0.0
-    for place, each in enumerate(recording.agent_messages):
-        if each.message == message:
-            until = bisect_right(calls, place, told, key=_position_of)
-            yield from _iterate_call_steps(calls[told:until])
-            told = until
-            kind: StepKind = "call" if each.reply_to is None else "return"
-            label, t = abbreviate_message(each.text, 60), None if each.t == shown_at else each.t
-            yield Step(kind, each.sender, each.receiver, label, t, to_one_line(each.note, 30))
-            shown_at = each.t
-    yield from _iterate_call_steps(calls[told:])
+    start_index, last_shown_time = 0, recording.messages[message].t if message >= 0 else 0.0
+    for position, agent_message in enumerate(recording.agent_messages):
+        if agent_message.message == message:
+            end_index = bisect_right(calls, position, start_index, key=_position_of)
+            yield from _iterate_call_steps(calls[start_index:end_index])
+            start_index = end_index
+            kind: StepKind = "call" if agent_message.reply_to is None else "return"
+            label, t = (
+                abbreviate_message(agent_message.text, 60),
+                None if agent_message.t == last_shown_time else agent_message.t,
+            )
+            yield Step(
+                kind, agent_message.sender, agent_message.receiver, label, t, to_one_line(agent_message.note, 30)
+            )
+            last_shown_time = agent_message.t
+    yield from _iterate_call_steps(calls[start_index:])
 
 
 def _position_of(call: Call) -> int:
@@ -217,13 +224,13 @@ def _position_of(call: Call) -> int:
 
 def _iterate_call_steps(calls: Iterable[Call]) -> Iterator[Step]:
     """Yield each call, the calls inside it, and its return. ``calls`` are in the order in which they ended."""
-    ended: list[tuple[int, list[Step]]] = []  # depth and steps of calls whose caller has not ended yet
+    finished_calls: list[tuple[int, list[Step]]] = []  # depth and steps of calls whose caller has not ended yet
     for call in calls:
         inner: list[Step] = []
-        while ended and ended[-1][0] > call.depth:
-            inner = ended.pop()[1] + inner
-        ended.append((call.depth, [_build_call_step(call), *inner, *_iterate_return_steps(call)]))
-    for _, steps in ended:
+        while finished_calls and finished_calls[-1][0] > call.depth:
+            inner = finished_calls.pop()[1] + inner
+        finished_calls.append((call.depth, [_build_call_step(call), *inner, *_iterate_return_steps(call)]))
+    for _, steps in finished_calls:
         yield from steps
 
 
@@ -250,5 +257,5 @@ def _iterate_return_steps(call: Call) -> Iterator[Step]:
         )
 
 
-def _identify_party(name: str, otherwise: str = "network") -> str:
-    return _KNOWN_PARTIES.get(name, otherwise)
+def _identify_party(name: str, default: str = "network") -> str:
+    return _KNOWN_PARTIES.get(name, default)

@@ -61,28 +61,36 @@ def draw_sequence(diagram: Diagram, title: str, subtitle: str, highlights: Highl
     lanes = {actor.name: _EDGE + number * gap for number, actor in enumerate(diagram.actors)}
     if count == 1:
         lanes = {diagram.actors[0].name: width / 2}
-    half = min(gap / 2 - 0.06, _EDGE - 0.08)
-    heads = {actor.name: break_label(actor.label, 2 * half, 3) for actor in diagram.actors}
+    half_width = min(gap / 2 - 0.06, _EDGE - 0.08)
+    heading_lines = {actor.name: break_label(actor.label, 2 * half_width, 3) for actor in diagram.actors}
     rows = [_build_row(step, lanes, width) for step in diagram.steps]
-    head = LINE_HEIGHT * max(map(len, heads.values())) + 0.16
-    top = head + (0.24 if diagram.groups else 0.12)
-    body = top + sum(row.height for row in rows) + 0.16
-    figure = create_figure(HEAD - 0.04 + body + _FOOT, title, subtitle, width)
-    axes = add_axes(figure, 0, _FOOT, width, body)
+    heading_height = LINE_HEIGHT * max(map(len, heading_lines.values())) + 0.16
+    top = heading_height + (0.24 if diagram.groups else 0.12)
+    body_height = top + sum(row.height for row in rows) + 0.16
+    figure = create_figure(HEAD - 0.04 + body_height + _FOOT, title, subtitle, width)
+    axes = add_axes(figure, 0, _FOOT, width, body_height)
     axes.set_axis_off()
     axes.set_xlim(0, width)
-    axes.set_ylim(0, body)
+    axes.set_ylim(0, body_height)
     for group in diagram.groups:
-        across = [lanes[name] for name in group.members]
-        if across:
-            left = min(across) - half - 0.05
-            draw_group_frame(axes, left, 0.02, max(across) + half + 0.05 - left, body - 0.03, group.colour, group.label)
-    level = body - (0.2 if diagram.groups else 0.06) - head / 2
+        member_positions = [lanes[name] for name in group.members]
+        if member_positions:
+            left = min(member_positions) - half_width - 0.05
+            draw_group_frame(
+                axes,
+                left,
+                0.02,
+                max(member_positions) + half_width + 0.05 - left,
+                body_height - 0.03,
+                group.colour,
+                group.label,
+            )
+    level = body_height - (0.2 if diagram.groups else 0.06) - heading_height / 2
     for actor in diagram.actors:
         x = lanes[actor.name]
         axes.plot([x, x], [0.02, level], color=RULE, linewidth=1.0, zorder=1)
-        draw_actor(axes, actor, x, level, 2 * half, head, heads[actor.name], highlights)
-    y = level - head / 2 - 0.06
+        draw_actor(axes, actor, x, level, 2 * half_width, heading_height, heading_lines[actor.name], highlights)
+    y = level - heading_height / 2 - 0.06
     for row in rows:
         _draw_row(axes, row, lanes, y, highlights, width)
         y -= row.height
@@ -110,15 +118,17 @@ def _draw_row(
     source, target = lanes[step.source], lanes[step.target]
     baseline = y - LINE_HEIGHT * max(1, len(row.lines)) - 0.08
     colour = choose_arrow_colour(step, highlights)
-    signed = highlights.add_sign(step, row.lines)
+    label_lines = highlights.add_sign(step, row.lines)
     if source == target:
         side = -_SELF if source > width - 1.2 else _SELF
         axes.plot([source, source + side, source + side], [baseline + 0.06, baseline + 0.06, baseline - 0.06],
                   color=colour, linewidth=1.2, zorder=2)  # fmt: skip
         draw_arrow(axes, step, (source + side, baseline - 0.06), (source, baseline - 0.06), highlights)
-        draw_label(axes, _clamp_to_page(source + side / 2, signed, width), baseline + 0.08, signed, colour)
+        draw_label(axes, _clamp_to_page(source + side / 2, label_lines, width), baseline + 0.08, label_lines, colour)
     else:
-        draw_label(axes, _clamp_to_page((source + target) / 2, signed, width), baseline + 0.05, signed, colour)
+        draw_label(
+            axes, _clamp_to_page((source + target) / 2, label_lines, width), baseline + 0.05, label_lines, colour
+        )
         stop = source + 0.66 * (target - source) if step.failed else target
         draw_arrow(axes, step, (source, baseline), (stop, baseline), highlights)
         if step.failed:
@@ -145,5 +155,5 @@ def _draw_note(axes: Axes, row: _StepRow, x: float, baseline: float, width: floa
 
 def _clamp_to_page(x: float, lines: Sequence[str], width: float) -> float:
     """Return the centre of a label, moved so that it stays on the page."""
-    half = max((len(line) for line in lines), default=0) / CHARACTERS / 2 + 0.06
-    return min(max(x, half), width - half)
+    half_width = max((len(line) for line in lines), default=0) / CHARACTERS / 2 + 0.06
+    return min(max(x, half_width), width - half_width)

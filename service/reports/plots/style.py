@@ -110,8 +110,10 @@ def load_font(size: float, *, bold: bool = False) -> FontProperties:
 
 def replace_missing_glyphs(text: str) -> str:
     """Replace every character that the type lacks, so that none is drawn as an empty box."""
-    known = _load_known_characters()
-    return "".join(character if character == "\n" or ord(character) in known else "\ufffd" for character in text)
+    known_characters = _load_known_characters()
+    return "".join(
+        character if character == "\n" or ord(character) in known_characters else "\ufffd" for character in text
+    )
 
 
 def render_png(figure: Figure) -> bytes:
@@ -133,14 +135,14 @@ def _reduce_colours(rgba: NDArray[np.uint8]) -> Image.Image:
     pixels = np.ascontiguousarray(rgba).view(np.uint32).ravel()
     starts = np.flatnonzero(np.concatenate(([True], pixels[1:] != pixels[:-1])))
     lengths = np.diff(starts, append=pixels.size)
-    colours, which = np.unique(pixels[starts], return_inverse=True)
-    weights = np.ceil(np.sqrt(np.bincount(which, lengths))).astype(np.int64)
+    colours, colour_indices = np.unique(pixels[starts], return_inverse=True)
+    weights = np.ceil(np.sqrt(np.bincount(colour_indices, lengths))).astype(np.int64)
     sample = np.repeat(colours, weights).view(np.uint8).reshape(1, -1, 4)[:, :, :3]
-    chosen = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    first = np.cumsum(weights) - weights
-    indices = np.asarray(chosen).ravel()[first][which]
+    reduced_image = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    first_samples = np.cumsum(weights) - weights
+    indices = np.asarray(reduced_image).ravel()[first_samples][colour_indices]
     image = Image.fromarray(np.repeat(indices, lengths).reshape(height, width))
-    image.putpalette(chosen.getpalette() or [])
+    image.putpalette(reduced_image.getpalette() or [])
     return image
 
 

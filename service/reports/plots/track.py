@@ -42,25 +42,26 @@ def draw_track(
     predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Pixels | None
 ) -> Figure:
     """Draw the worst trial's images over its floor, and the fraction correct along the path over all tracks."""
-    own = find_tracks(predictions, trials)
-    by_trial = {index: collect_track_images(predictions, trials, index) for index in own}
-    worst = find_worst_track(predictions, trials)
-    images = [item for items in by_trial.values() for item in items]
-    right = sum(item.right for item in images)
-    view = _choose_viewport(by_trial[worst])
+    track_trials = find_tracks(predictions, trials)
+    images_by_trial = {index: collect_track_images(predictions, trials, index) for index in track_trials}
+    worst_trial = find_worst_track(predictions, trials)
+    images = [item for items in images_by_trial.values() for item in items]
+    correct_count = sum(item.right for item in images)
+    view = _choose_viewport(images_by_trial[worst_trial])
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     height = width * view.height / view.width
-    trial = trials[worst]
-    what = f"{right} of n = {len(images)} images correct, {len(own)} {'trial' if len(own) == 1 else 'trials'}"
-    where = f"floor: {trial.scenario}, trial {trial.index + 1}"
-    figure = create_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{what}; {where}")
-    top = add_axes(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
-    draw_floor_part(top, floor, view)
-    top.set_xlim(view.left, view.right)
-    top.set_ylim(view.bottom, view.top)
-    _draw_images(top, by_trial[worst], 0.045 * view.width)
-    top.set_xlabel("x, mm", font=load_font(8), labelpad=1)
-    top.set_ylabel("y, mm", font=load_font(8), labelpad=4)
+    trial = trials[worst_trial]
+    trial_word = "trial" if len(track_trials) == 1 else "trials"
+    summary = f"{correct_count} of n = {len(images)} images correct, {len(track_trials)} {trial_word}"
+    location = f"floor: {trial.scenario}, trial {trial.index + 1}"
+    figure = create_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{summary}; {location}")
+    track_axes = add_axes(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
+    draw_floor_part(track_axes, floor, view)
+    track_axes.set_xlim(view.left, view.right)
+    track_axes.set_ylim(view.bottom, view.top)
+    _draw_images(track_axes, images_by_trial[worst_trial], 0.045 * view.width)
+    track_axes.set_xlabel("x, mm", font=load_font(8), labelpad=1)
+    track_axes.set_ylabel("y, mm", font=load_font(8), labelpad=4)
     _draw_accuracy_curve(add_axes(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
     write_text(figure, 0.08, 0.23, "beside each place: ○ correct  ✗ wrong  □ no answer", size=8, colour=FAINT)
     write_text(figure, 0.08, 0.09, "band: 95 % interval; above it: n", size=8, colour=FAINT)
@@ -69,17 +70,17 @@ def draw_track(
 
 def compute_accuracy_curve(images: Sequence[TrackImage]) -> Curve:
     """Return the fraction correct in at most twelve sections of equal length, at the middle of each."""
-    first, last = min(item.distance for item in images), max(item.distance for item in images)
-    length = max((last - first) / _MOST_BINS, 1.0)
+    first_distance, last_distance = min(item.distance for item in images), max(item.distance for item in images)
+    length = max((last_distance - first_distance) / _MOST_BINS, 1.0)
     bins: dict[int, list[bool]] = {}
     for item in images:
-        bins.setdefault(min(int((item.distance - first) / length), _MOST_BINS - 1), []).append(item.right)
-    places = sorted(bins)
-    counts = [(sum(bins[place]), len(bins[place])) for place in places]
+        bins.setdefault(min(int((item.distance - first_distance) / length), _MOST_BINS - 1), []).append(item.right)
+    bin_numbers = sorted(bins)
+    counts = [(sum(bins[place]), len(bins[place])) for place in bin_numbers]
     intervals = [compute_wilson_interval(*pair) for pair in counts]
     return Curve(
         "",
-        tuple(first + (place + 0.5) * length for place in places),
+        tuple(first_distance + (place + 0.5) * length for place in bin_numbers),
         tuple(right / count for right, count in counts),
         tuple(low for low, _ in intervals),
         tuple(high for _, high in intervals),
@@ -87,20 +88,20 @@ def compute_accuracy_curve(images: Sequence[TrackImage]) -> Curve:
     )
 
 
-def _draw_images(axes: Axes, images: Sequence[TrackImage], beside: float) -> None:
-    """Draw the marks ``beside`` mm to the robot's left of the sensor, so that the floor stays visible."""
+def _draw_images(axes: Axes, images: Sequence[TrackImage], offset: float) -> None:
+    """Draw the marks ``offset`` mm to the robot's left of the sensor, so that the floor stays visible."""
     axes.plot(
         [item.x for item in images], [item.y for item in images], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
     )
-    shown = []
+    marks = []
     for item in images:
         angle = math.radians(item.heading + 90)
-        x, y = item.x + beside * math.cos(angle), item.y + beside * math.sin(angle)
+        x, y = item.x + offset * math.cos(angle), item.y + offset * math.sin(angle)
         axes.plot([item.x, x], [item.y, y], color=FAINT, linewidth=0.5, zorder=3)
-        shown.append((x, y, *_choose_mark(item)))
-    for x, y, marker, _ in shown:
+        marks.append((x, y, *_choose_mark(item)))
+    for x, y, marker, _ in marks:
         _draw_mark(axes, x, y, marker, "white", 5.4, 2.2)
-    for x, y, marker, colour in shown:
+    for x, y, marker, colour in marks:
         _draw_mark(axes, x, y, marker, colour, 4.4, 1.2)
 
 

@@ -32,12 +32,14 @@ class TrackImage:
 
 def find_tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]) -> tuple[int, ...]:
     """Return the indices of the trials whose images were taken far enough apart to form a track."""
-    found = []
+    track_indices = []
     for index in dict.fromkeys(prediction.trial for prediction in predictions):
-        places = [locate_part(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index]
-        if len(places) > 2 and max(math.dist(places[0], place) for place in places) >= _SHORTEST_TRACK:
-            found.append(index)
-    return tuple(found)
+        positions = [
+            locate_part(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index
+        ]
+        if len(positions) > 2 and max(math.dist(positions[0], place) for place in positions) >= _SHORTEST_TRACK:
+            track_indices.append(index)
+    return tuple(track_indices)
 
 
 def collect_track_images(
@@ -45,11 +47,11 @@ def collect_track_images(
 ) -> tuple[TrackImage, ...]:
     """Return the images of one trial, in the order sent."""
     recording = trials[index].recording
-    way = _compute_distances(recording)
+    distances = _compute_distances(recording)
     return tuple(
         TrackImage(
             *locate_part(recording, "left", prediction.image.pose),
-            way[min(max(prediction.image.tick, 0), len(way) - 1)],
+            distances[min(max(prediction.image.tick, 0), len(distances) - 1)],
             prediction.image.pose.heading,
             is_right(prediction),
             prediction.answer is not None,
@@ -63,8 +65,8 @@ def find_worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialRe
     """Return the trial with a track and the smallest fraction of correct images, the first among equals."""
 
     def share_right(index: int) -> float:
-        own = [is_right(prediction) for prediction in predictions if prediction.trial == index]
-        return sum(own) / len(own)
+        results = [is_right(prediction) for prediction in predictions if prediction.trial == index]
+        return sum(results) / len(results)
 
     return min(find_tracks(predictions, trials), key=share_right)
 
@@ -72,8 +74,8 @@ def find_worst_track(predictions: Sequence[Prediction], trials: Sequence[TrialRe
 def _compute_distances(recording: Recording) -> list[float]:
     """Return the distance driven by the centre of the axle at the start and after each tick, mm."""
     points = [(recording.start.x, recording.start.y), *zip(recording.ticks.x, recording.ticks.y, strict=True)]
-    way = [0.0]
-    for before, after in pairwise(points):
-        step = math.dist(before, after)
-        way.append(way[-1] + (step if math.isfinite(step) else 0.0))
-    return way
+    distances = [0.0]
+    for previous_point, current_point in pairwise(points):
+        step = math.dist(previous_point, current_point)
+        distances.append(distances[-1] + (step if math.isfinite(step) else 0.0))
+    return distances

@@ -42,34 +42,34 @@ def build_grade_replay(
     view: View,
     submission: Submission | None = None,
     own_floors: Mapping[str, Pixels] = _NO_FLOORS,
-    most_bytes: float = math.inf,
-    others: OverlayTrials = NO_OVERLAY,
+    max_bytes: float = math.inf,
+    overlay_trials: OverlayTrials = NO_OVERLAY,
 ) -> dict[str, Any]:
     """Return the trials of the view: first the worst of each scenario, then the others.
 
-    It includes as many as fit into ``most_bytes`` when compressed, and at least one. ``own_floors`` are floors that are
-    not built in, by name. ``others`` are drawn over the trials of the same index.
+    It includes as many as fit into ``max_bytes`` when compressed, and at least one. ``own_floors`` are floors that are
+    not built in, by name. ``overlay_trials`` are drawn over the trials of the same index.
     """
     grade = view.grade
-    worst = [find_worst_trial(grade, scenario) for scenario in list_scenarios(grade)]
-    order = dict.fromkeys([*worst, *range(len(grade.trials))])
+    worst_trials = [find_worst_trial(grade, scenario) for scenario in list_scenarios(grade)]
+    order = dict.fromkeys([*worst_trials, *range(len(grade.trials))])
     sources = collect_sources(submission)
-    chosen: dict[int, dict[str, Any]] = {}
-    left = most_bytes
+    chosen_trials: dict[int, dict[str, Any]] = {}
+    remaining_bytes = max_bytes
     for index in order:
-        told = {
+        trial_data = {
             **trial_to_json(grade.trials[index], sources, grade.criteria, index, view.language),
-            **_build_overlay(grade.trials, index, others, view.language),
+            **_build_overlay(grade.trials, index, overlay_trials, view.language),
         }
-        left -= len(compress_replay(told)) if most_bytes < math.inf else 0
-        if left < 0 and chosen:
+        remaining_bytes -= len(compress_replay(trial_data)) if max_bytes < math.inf else 0
+        if remaining_bytes < 0 and chosen_trials:
             break
-        chosen[index] = told
+        chosen_trials[index] = trial_data
     title = f"{grade.assignment_title}: {grade.student}"
-    kept = sorted(chosen)
-    trials = [(grade.trials[index], chosen[index]) for index in kept]
-    first = kept.index(worst[0]) if kept else 0
-    return {**_build_document(title, trials, sources, own_floors), "of": len(grade.trials), "first": first}
+    kept_indices = sorted(chosen_trials)
+    trials = [(grade.trials[index], chosen_trials[index]) for index in kept_indices]
+    first_index = kept_indices.index(worst_trials[0]) if kept_indices else 0
+    return {**_build_document(title, trials, sources, own_floors), "of": len(grade.trials), "first": first_index}
 
 
 def build_run_replay(
@@ -78,16 +78,16 @@ def build_run_replay(
     seed: int,
     sources: Sources,
     own_floors: Mapping[str, Pixels],
-    others: OverlayTrials = NO_OVERLAY,
+    overlay_trials: OverlayTrials = NO_OVERLAY,
 ) -> dict[str, Any]:
     """Return the replay of one unmarked run, in English."""
     trial = TrialResult(name, 0, seed, 0, 0, "visible", recording)
-    told = {
+    trial_data = {
         **trial_to_json(trial, sources),
-        **_build_overlay((trial,), 0, others, ENGLISH),
+        **_build_overlay((trial,), 0, overlay_trials, ENGLISH),
         "name": to_one_line(name, 60),
     }
-    return {**_build_document(name, [(trial, told)], sources, own_floors), "of": 1, "first": 0}
+    return {**_build_document(name, [(trial, trial_data)], sources, own_floors), "of": 1, "first": 0}
 
 
 def compress_replay(document: Mapping[str, Any]) -> bytes:
@@ -96,10 +96,14 @@ def compress_replay(document: Mapping[str, Any]) -> bytes:
 
 
 def _build_overlay(
-    trials: Sequence[TrialResult], index: int, others: OverlayTrials, language: Language
+    trials: Sequence[TrialResult], index: int, overlay_trials: OverlayTrials, language: Language
 ) -> dict[str, Any]:
-    other = others.trials.get(index)
-    return {} if other is None else {"over": overlay_to_json(trials[index], other, others.name, language)}
+    other_trial = overlay_trials.trials.get(index)
+    return (
+        {}
+        if other_trial is None
+        else {"over": overlay_to_json(trials[index], other_trial, overlay_trials.name, language)}
+    )
 
 
 def _build_document(
@@ -110,29 +114,29 @@ def _build_document(
 ) -> dict[str, Any]:
     numbers: dict[tuple[str, bool, int], int] = {}
     floors: list[dict[str, Any]] = []
-    told = []
+    trial_documents = []
     for trial, data in trials:
         recording = trial.recording
-        ground = (recording.background, recording.label_patches, recording.sheet)
-        if ground not in numbers:
-            numbers[ground] = len(floors)
+        floor_key = (recording.background, recording.label_patches, recording.sheet)
+        if floor_key not in numbers:
+            numbers[floor_key] = len(floors)
             floors.append(_floor_to_json(recording, own_floors))
-        told.append({**data, "floor": numbers[ground]})
+        trial_documents.append({**data, "floor": numbers[floor_key]})
     return {
         "format": FORMAT,
         "version": VERSION,
         "title": to_one_line(title, 200),
         "floors": floors,
         "sources": [source.to_json() for source in sources.shown],
-        "trials": told,
+        "trials": trial_documents,
     }
 
 
 def _floor_to_json(recording: Recording, own_floors: Mapping[str, Pixels]) -> dict[str, Any]:
     """Return the floor of the trial, without an image if it is not available any more."""
-    own = own_floors.get(recording.background)
-    if own is not None:
-        image = _encode_image(own)
+    own_floor = own_floors.get(recording.background)
+    if own_floor is not None:
+        image = _encode_image(own_floor)
     elif recording.background in list_floor_names():
         image = _encode_built_in(recording.background, recording.label_patches, recording.sheet)
     else:
@@ -154,7 +158,7 @@ def _encode_image(pixels: Pixels) -> str:
     return f"data:image/webp;base64,{base64.b64encode(data).decode('ascii')}"
 
 
-def _encode_webp(image: Image.Image, **how: Any) -> bytes:
+def _encode_webp(image: Image.Image, **options: Any) -> bytes:
     buffer = io.BytesIO()
-    image.save(buffer, "WEBP", **how)
+    image.save(buffer, "WEBP", **options)
     return buffer.getvalue()

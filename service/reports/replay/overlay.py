@@ -24,34 +24,34 @@ _COLUMNS = frozenset({"x", "y", "heading", "left_position", "right_position"})
 _KEPT_KEYS = ("verdict", "ended", "seconds", "tick", "messages", "events", "left_out")
 
 
-def overlay_to_json(trial: TrialResult, other: TrialResult, name: str, language: Language) -> dict[str, Any]:
-    """Return the data of ``other`` to show beside ``trial``. ``name`` is the name of its student."""
-    told = trial_to_json(other, Sources(), language=language)
-    robots = [{**robot, "columns": _select_columns(robot["columns"]), "images": []} for robot in told["robots"]]
+def overlay_to_json(trial: TrialResult, other_trial: TrialResult, name: str, language: Language) -> dict[str, Any]:
+    """Return the data of ``other_trial`` to show beside ``trial``. ``name`` is the name of its student."""
+    trial_data = trial_to_json(other_trial, Sources(), language=language)
+    robots = [{**robot, "columns": _select_columns(robot["columns"]), "images": []} for robot in trial_data["robots"]]
     return {
         "name": to_one_line(name, 60),
-        **{key: told[key] for key in _KEPT_KEYS},
+        **{key: trial_data[key] for key in _KEPT_KEYS},
         "robots": robots,
-        "parted": find_divergence(trial.recording, other.recording),
+        "parted": find_divergence(trial.recording, other_trial.recording),
     }
 
 
-def find_divergence(one: Recording, other: Recording) -> float | None:
+def find_divergence(recording: Recording, other_recording: Recording) -> float | None:
     """Return the first time at which a robot's poses differ by more than 10 mm or 5 degrees; None if they never do.
 
     A robot whose trial has ended stays where it is.
     """
-    pairs = zip(iterate_robots(one), iterate_robots(other), strict=False)
+    pairs = zip(iterate_robots(recording), iterate_robots(other_recording), strict=False)
     moments = [_find_robot_divergence(own, others) for (_, own), (_, others) in pairs]
     return min((moment for moment in moments if moment is not None), default=None)
 
 
-def _find_robot_divergence(one: Recording, other: Recording) -> float | None:
-    times = np.union1d(_compute_times(one), _compute_times(other))
-    x, y, heading = (_interpolate_poses(one, times) - _interpolate_poses(other, times)).T
-    turned = np.abs((heading + 180) % 360 - 180)
-    apart = np.flatnonzero((np.hypot(x, y) > _FAR_MM) | (turned > _TURNED))
-    return float(times[apart[0]]) if apart.size else None
+def _find_robot_divergence(recording: Recording, other_recording: Recording) -> float | None:
+    times = np.union1d(_compute_times(recording), _compute_times(other_recording))
+    x, y, heading = (_interpolate_poses(recording, times) - _interpolate_poses(other_recording, times)).T
+    heading_differences = np.abs((heading + 180) % 360 - 180)
+    diverged_rows = np.flatnonzero((np.hypot(x, y) > _FAR_MM) | (heading_differences > _TURNED))
+    return float(times[diverged_rows[0]]) if diverged_rows.size else None
 
 
 def _compute_times(recording: Recording) -> NDArray[np.float64]:
@@ -63,8 +63,8 @@ def _interpolate_poses(recording: Recording, times: NDArray[np.float64]) -> NDAr
     """Return the poses at these times, one row each, interpolated linearly between ticks."""
     ticks, start = recording.ticks, recording.start
     columns = ((ticks.x, start.x), (ticks.y, start.y), (ticks.heading, start.heading))
-    known = [np.concatenate(([first], values)) for values, first in columns]
-    return np.stack([np.interp(times, _compute_times(recording), values) for values in known], axis=1)
+    series = [np.concatenate(([first], values)) for values, first in columns]
+    return np.stack([np.interp(times, _compute_times(recording), values) for values in series], axis=1)
 
 
 def _select_columns(columns: dict[str, Any]) -> dict[str, Any]:

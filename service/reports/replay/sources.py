@@ -41,8 +41,8 @@ class ShownSource:
     def to_json(self) -> dict[str, object]:
         """Return the source as replay data, with long lines and files shortened."""
         lines = self.text.rstrip("\n").split("\n")
-        shown = [to_display_text(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
-        return {"name": to_one_line(self.name, 80), "lines": shown, "more": len(lines) - len(shown)}
+        shown_lines = [to_display_text(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
+        return {"name": to_one_line(self.name, 80), "lines": shown_lines, "more": len(lines) - len(shown_lines)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class Place:
 class Sources:
     """All sources of a submission, or of a run."""
 
-    def __init__(self, shown: Sequence[ShownSource] = ()) -> None:
-        self.shown = tuple(shown)
+    def __init__(self, sources: Sequence[ShownSource] = ()) -> None:
+        self.shown = tuple(sources)
         #: The lines of each text, at most two: with two, the line is ambiguous.
         self._writers: dict[_OutputText, list[Place]] = {}
         for index, source in enumerate(self.shown):
@@ -68,16 +68,18 @@ class Sources:
                         places.append(Place(index, line))
         self._lengths = sorted({len(writer.begins) for writer in self._writers if not writer.is_all})
 
-    def find_writing_line(self, text: str, *, spoken: bool = False) -> Place | None:
+    def find_writing_line(self, text: str, *, is_spoken: bool = False) -> Place | None:
         """Return the only line of the robot program that can have printed, or spoken, the text; None if unknown.
 
         The text's beginnings are looked up one by one, so that long sources and many texts don't slow it down.
         """
         text = _IMAGE if text.startswith(f"{_IMAGE}::") else text
-        possible = [_OutputText(not spoken, text, True)]
-        possible += [_OutputText(not spoken, text[:length], False) for length in self._lengths if length <= len(text)]
-        found = [place for writer in possible for place in self._writers.get(writer, ())]
-        return found[0] if len(found) == 1 else None
+        possible_writers = [_OutputText(not is_spoken, text, True)]
+        possible_writers += [
+            _OutputText(not is_spoken, text[:length], False) for length in self._lengths if length <= len(text)
+        ]
+        places = [place for writer in possible_writers for place in self._writers.get(writer, ())]
+        return places[0] if len(places) == 1 else None
 
     def find_fault_line(self, fault: Fault) -> Place | None:
         """Return the line that a fault names, if it is in the shown sources."""

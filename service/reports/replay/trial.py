@@ -38,29 +38,29 @@ _MOST_STEPS = 2.0**52
 
 def columns_to_json(ticks: Ticks) -> dict[str, dict[str, Any]]:
     """Return every column with known values, by its public name."""
-    told = {}
-    for each in COLUMNS:
-        values = np.asarray(getattr(ticks, each.display_attribute), np.float64).reshape(len(ticks), each.width)
+    columns = {}
+    for column in COLUMNS:
+        values = np.asarray(getattr(ticks, column.display_attribute), np.float64).reshape(len(ticks), column.width)
         if len(ticks) and np.isfinite(values).any():
-            per = _STEPS_OF_FINE if each.name in _FINE_COLUMNS else _STEPS
-            told[each.display_attribute] = {
-                "unit": each.unit,
-                "per": per,
-                "added": [_encode_differences(part, per) for part in values.T],
+            steps_per_unit = _STEPS_OF_FINE if column.name in _FINE_COLUMNS else _STEPS
+            columns[column.display_attribute] = {
+                "unit": column.unit,
+                "per": steps_per_unit,
+                "added": [_encode_differences(part, steps_per_unit) for part in values.T],
             }
-    return told
+    return columns
 
 
-def _encode_differences(values: NDArray[np.float64], per: int) -> list[int | None]:
+def _encode_differences(values: NDArray[np.float64], steps_per_unit: int) -> list[int | None]:
     """Return the difference of each value from the previous one, the first from 0; None for missing values."""
-    known = np.isfinite(values)
-    within = np.clip(np.where(known, values, 0), -_MOST_STEPS / per, _MOST_STEPS / per)
-    steps = np.rint(within * per).astype(np.int64)
-    added: list[int | None] = [None] * len(values)
-    differences = np.diff(steps[known], prepend=0).tolist()
-    for place, difference in zip(np.flatnonzero(known).tolist(), differences, strict=True):
-        added[place] = difference
-    return added
+    is_known = np.isfinite(values)
+    clipped_values = np.clip(np.where(is_known, values, 0), -_MOST_STEPS / steps_per_unit, _MOST_STEPS / steps_per_unit)
+    steps = np.rint(clipped_values * steps_per_unit).astype(np.int64)
+    encoded_differences: list[int | None] = [None] * len(values)
+    differences = np.diff(steps[is_known], prepend=0).tolist()
+    for index, difference in zip(np.flatnonzero(is_known).tolist(), differences, strict=True):
+        encoded_differences[index] = difference
+    return encoded_differences
 
 
 def trial_to_json(
@@ -72,9 +72,9 @@ def trial_to_json(
 ) -> dict[str, Any]:
     """Return all data of a trial except its floor. ``index`` is its index in the evidence of the ``criteria``."""
     recording = trial.recording
-    texts, left_out = _collect_events(recording, sources, language)
+    events, omitted_count = _collect_events(recording, sources, language)
     messages = sorted(_iterate_messages(recording, sources, language), key=lambda message: message["t"])
-    left_out += max(0, len(messages) - _MOST_EVENTS)
+    omitted_count += max(0, len(messages) - _MOST_EVENTS)
     predictions = [each for result in criteria for each in result.predictions if each.trial == index]
     return {
         "trial": index + 1,
@@ -87,8 +87,8 @@ def trial_to_json(
         "beacon": recording.beacon,
         "robots": [_robot_to_json(name, own, predictions) for name, own in iterate_robots(recording)],
         "messages": messages[:_MOST_EVENTS],
-        "events": texts,
-        "left_out": left_out,
+        "events": events,
+        "left_out": omitted_count,
         "lost": _collect_losses(recording, criteria, index),
     }
 
@@ -134,33 +134,33 @@ def _pose_to_json(pose: Pose) -> list[float]:
 
 
 def _image_to_json(image: Image, predictions: Sequence[Prediction]) -> dict[str, Any]:
-    told: dict[str, Any] = {
+    data: dict[str, Any] = {
         "t": image.t,
         "side": image.side,
         "pose": _pose_to_json(image.pose),
         "left": _encode_pixels(image.left),
         "right": _encode_pixels(image.right),
     }
-    for each in predictions:
-        if (each.image.t, each.image.message) == (image.t, image.message):
-            told["truth"] = to_one_line(each.truth, 60)
-            told["answer"] = None if each.answer is None else to_one_line(each.answer, 60)
-    return told
+    for prediction in predictions:
+        if (prediction.image.t, prediction.image.message) == (image.t, image.message):
+            data["truth"] = to_one_line(prediction.truth, 60)
+            data["answer"] = None if prediction.answer is None else to_one_line(prediction.answer, 60)
+    return data
 
 
 def _encode_pixels(rgba: bytes) -> str:
     """Return the pixels without their alpha values, which are all equal."""
-    whole = rgba[: len(rgba) // 4 * 4]
-    return base64.b64encode(np.frombuffer(whole, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
+    pixel_bytes = rgba[: len(rgba) // 4 * 4]
+    return base64.b64encode(np.frombuffer(pixel_bytes, np.uint8).reshape(-1, 4)[:, :3].tobytes()).decode("ascii")
 
 
 def _collect_events(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
     """Return prints, speech, touches and faults by time, and how many are left out."""
     events: list[dict[str, Any]] = []
-    left_out = 0
-    for robot, own in iterate_robots(recording):
-        is_students, printed = own is recording, collect_printed_lines(own)
-        kinds: tuple[list[dict[str, Any]], ...] = (
+    omitted_count = 0
+    for robot, robot_recording in iterate_robots(recording):
+        is_students, printed = robot_recording is recording, collect_printed_lines(robot_recording)
+        event_groups: tuple[list[dict[str, Any]], ...] = (
             [
                 _event_to_json(
                     line.t, robot, "printed", line.text, sources.find_writing_line(line.text) if is_students else None
@@ -173,13 +173,13 @@ def _collect_events(recording: Recording, sources: Sources, language: Language) 
                     robot,
                     "said",
                     line.text,
-                    sources.find_writing_line(line.text, spoken=True) if is_students else None,
+                    sources.find_writing_line(line.text, is_spoken=True) if is_students else None,
                 )
-                for line in own.spoken[:_MOST_EVENTS]
+                for line in robot_recording.spoken[:_MOST_EVENTS]
             ],
             [
                 {**_event_to_json(touch.t, robot, "touched", touch.what), "pose": _pose_to_json(touch.pose)}
-                for touch in own.touches[:_MOST_EVENTS]
+                for touch in robot_recording.touches[:_MOST_EVENTS]
             ],
             [
                 _event_to_json(
@@ -189,23 +189,27 @@ def _collect_events(recording: Recording, sources: Sources, language: Language) 
                     f"{fault.message} ({describe_place(fault, language)})" if fault.place else fault.message,
                     sources.find_fault_line(fault),
                 )
-                for fault in own.faults[:_MOST_EVENTS]
+                for fault in robot_recording.faults[:_MOST_EVENTS]
             ],
         )
-        for kind, told in zip((printed, own.spoken, own.touches, own.faults), kinds, strict=True):
-            left_out += len(kind) - len(told)
-            events += told
-    return sorted(events, key=lambda event: event["t"]), left_out
+        for entries, kind_events in zip(
+            (printed, robot_recording.spoken, robot_recording.touches, robot_recording.faults),
+            event_groups,
+            strict=True,
+        ):
+            omitted_count += len(entries) - len(kind_events)
+            events += kind_events
+    return sorted(events, key=lambda event: event["t"]), omitted_count
 
 
-def _event_to_json(t: float, who: str, kind: str, text: str, place: Place | None = None) -> dict[str, Any]:
-    told = {
+def _event_to_json(t: float, party: str, kind: str, text: str, place: Place | None = None) -> dict[str, Any]:
+    data = {
         "t": t,
-        "who": to_one_line(who, 60),
+        "who": to_one_line(party, 60),
         "kind": kind,
         "text": to_display_text(text, _LONGEST_TEXT, lines=_MOST_LINES),
     }
-    return {**told, **_place_to_json(place)}
+    return {**data, **_place_to_json(place)}
 
 
 def _place_to_json(place: Place | None) -> dict[str, Any]:
@@ -214,15 +218,15 @@ def _place_to_json(place: Place | None) -> dict[str, Any]:
 
 def _iterate_messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
     """Yield every message, with what the receiver got and when."""
-    for robot, own in iterate_robots(recording):
-        responder = select_answering_party(own)
-        other = PARTNER_OF[robot] if recording.partner is not None else responder
-        for message in own.messages:
+    for robot, robot_recording in iterate_robots(recording):
+        responder = select_answering_party(robot_recording)
+        other_party = PARTNER_OF[robot] if recording.partner is not None else responder
+        for message in robot_recording.messages:
             if message.sender == "partner":
                 continue  # the other robot's list has it
             from_robot = message.sender == "robot"
-            receiver = other if message.to_partner or recording.partner is None else responder
-            told: dict[str, Any] = {
+            receiver = other_party if message.to_partner or recording.partner is None else responder
+            data: dict[str, Any] = {
                 "t": message.t,
                 "from": robot if from_robot else responder,
                 "to": receiver if from_robot else robot,
@@ -230,34 +234,34 @@ def _iterate_messages(recording: Recording, sources: Sources, language: Language
                 "arrived": message.delivered,
             }
             if message.arrived_as is not None:
-                told["arrived_as"] = abbreviate_message(message.arrived_as, _LONGEST_TEXT)
-            befell = describe_loss_fully(message, language)
-            if befell:
-                told["befell"] = befell
-            if from_robot and own is recording:
-                told |= _place_to_json(sources.find_writing_line(message.text))
-            yield told
-    for each in recording.agent_messages:
-        told = {
-            "t": each.t,
-            "from": to_one_line(each.sender, 60),
-            "to": to_one_line(each.receiver, 60),
-            "text": abbreviate_message(each.text, _LONGEST_TEXT),
-            "arrived": None if each.note else each.t,
+                data["arrived_as"] = abbreviate_message(message.arrived_as, _LONGEST_TEXT)
+            loss_text = describe_loss_fully(message, language)
+            if loss_text:
+                data["befell"] = loss_text
+            if from_robot and robot_recording is recording:
+                data |= _place_to_json(sources.find_writing_line(message.text))
+            yield data
+    for agent_message in recording.agent_messages:
+        data = {
+            "t": agent_message.t,
+            "from": to_one_line(agent_message.sender, 60),
+            "to": to_one_line(agent_message.receiver, 60),
+            "text": abbreviate_message(agent_message.text, _LONGEST_TEXT),
+            "arrived": None if agent_message.note else agent_message.t,
         }
-        yield {**told, "befell": describe_note(each.note, language)} if each.note else told
+        yield {**data, "befell": describe_note(agent_message.note, language)} if agent_message.note else data
 
 
 def _collect_losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:
     """Return each criterion that the trial failed, with time and place."""
-    lost = []
+    losses = []
     for result in criteria:
         # An excused criterion has no marks to lose.
         for item in result.evidence if result.max_marks else ():
             if item.passed or item.trial != index:
                 continue
             t = compute_loss_time(recording, item.t)
-            lost.append(
+            losses.append(
                 {
                     "t": t,
                     "pose": _pose_to_json(item.pose or get_pose_at(recording, t)),
@@ -266,4 +270,4 @@ def _collect_losses(recording: Recording, criteria: Sequence[CriterionResult], i
                     "marks": f"{format_decimal(result.marks)} / {format_decimal(result.max_marks)}",
                 }
             )
-    return lost
+    return losses

@@ -116,7 +116,7 @@ SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
 
 
 def load_table_lines(
-    session: Session, batch_id: str, refusals: Sequence[RejectedSubmission], hidden: HiddenNames
+    session: Session, batch_id: str, refusals: Sequence[RejectedSubmission], hidden_names: HiddenNames
 ) -> list[TableLine]:
     """Return all rows of a batch, ordered by student."""
     row = session.get(Batch, batch_id)  # kept, so that it is read once
@@ -152,58 +152,65 @@ def load_table_lines(
         .where(*match_standing_jobs(session, batch_id))
     )
     own_batch = None if row is None or row.regrade_of is not None else batch_id
-    lines = [_build_line(tuple(found), own_batch, hidden) for found in session.execute(query)]
+    lines = [_build_line(tuple(found), own_batch, hidden_names) for found in session.execute(query)]
     lines += [_build_rejected_line(refusal) for refusal in refusals]
     return sorted(lines, key=_build_student_key)
 
 
-def build_table_page(lines: Sequence[TableLine], asked: TableRequest) -> TablePage:
+def build_table_page(lines: Sequence[TableLine], request: TableRequest) -> TablePage:
     """Return the requested page of the matching rows, or the last page if there are fewer."""
-    text = asked.text.strip().casefold()
-    found = [
-        line for line in lines if (not asked.state or line.state == asked.state) and text in _build_search_text(line)
+    text = request.text.strip().casefold()
+    matching_lines = [
+        line
+        for line in lines
+        if (not request.state or line.state == request.state) and text in _build_search_text(line)
     ]
-    found.sort(key=SORTS.get(asked.sort, _build_student_key), reverse=asked.descending)
-    pages = max(1, -(-len(found) // ROWS_A_PAGE))
-    page = min(max(asked.page, 1), pages)
-    return TablePage(tuple(found[(page - 1) * ROWS_A_PAGE : page * ROWS_A_PAGE]), len(found), page, pages)
+    matching_lines.sort(key=SORTS.get(request.sort, _build_student_key), reverse=request.descending)
+    pages = max(1, -(-len(matching_lines) // ROWS_A_PAGE))
+    page = min(max(request.page, 1), pages)
+    return TablePage(
+        tuple(matching_lines[(page - 1) * ROWS_A_PAGE : page * ROWS_A_PAGE]), len(matching_lines), page, pages
+    )
 
 
 def load_review_counts(session: Session, lines: Sequence[TableLine]) -> dict[str, ReviewCounts]:
     """Return the review counts of some jobs, by job id."""
-    ids = [line.id for line in lines if line.id]
-    unjudged = dict(
+    job_ids = [line.id for line in lines if line.id]
+    unjudged_counts = dict(
         session.execute(
             select(CriterionResultRow.job_id, func.count())
             .join(Job, CriterionResultRow.job_id == Job.id)
-            .where(CriterionResultRow.job_id.in_(ids), overrides.match_unjudged())
+            .where(CriterionResultRow.job_id.in_(job_ids), overrides.match_unjudged())
             .group_by(CriterionResultRow.job_id)
         ).all()
     )
     surprises = dict(
         session.execute(
             select(TrialRow.job_id, func.count())
-            .where(TrialRow.job_id.in_(ids), TrialRow.surprise.is_not(None))
+            .where(TrialRow.job_id.in_(job_ids), TrialRow.surprise.is_not(None))
             .group_by(TrialRow.job_id)
         ).all()
     )
     return {
-        job_id: ReviewCounts(unjudged.get(job_id, 0), surprises.get(job_id, 0)) for job_id in {*unjudged, *surprises}
+        job_id: ReviewCounts(unjudged_counts.get(job_id, 0), surprises.get(job_id, 0))
+        for job_id in {*unjudged_counts, *surprises}
     }
 
 
-def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames) -> TableLine:
-    job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, *rest = row
-    error, cancelled_for, superseded_by, *rest = rest
-    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer = rest
-    nameless = assignment in hidden.assignments
-    took: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
+def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden_names: HiddenNames) -> TableLine:
+    job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, *remaining = row
+    error, cancelled_for, superseded_by, *remaining = remaining
+    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer_attempt = (
+        remaining
+    )
+    has_hidden_name = assignment in hidden_names.assignments
+    duration: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
     return TableLine(
         id=job_id,
         submission_id=submission_id,
-        student=hidden.label_student(assignment, student),
-        name="" if nameless else name,
-        source="" if nameless else source,
+        student=hidden_names.label_student(assignment, student),
+        name="" if has_hidden_name else name,
+        source="" if has_hidden_name else source,
         assignment=assignment,
         state=state.value,
         verdict=verdict,
@@ -217,10 +224,10 @@ def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden: HiddenNames
         days_late=days_late,
         attempt=attempt,
         sha256=sha256,
-        seconds=None if took is None else took.total_seconds(),
+        seconds=None if duration is None else duration.total_seconds(),
         published_at=published_at,
         elsewhere=own_batch is not None and batch_id != own_batch,
-        newer_attempt=newer,
+        newer_attempt=newer_attempt,
     )
 
 

@@ -139,24 +139,24 @@ def find_previous_job(session: Session, job_id: str) -> str:
 
     Skips staff-only and untrusted grades. Raises UsageError if there is none.
     """
-    mine = session.execute(
+    submission = session.execute(
         select(SubmissionRow).join(Job, Job.submission_id == SubmissionRow.id).where(Job.id == job_id)
     ).scalar_one()
-    found = session.scalar(
+    previous_id = session.scalar(
         select(Job.id)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(
-            SubmissionRow.enrolment_id == mine.enrolment_id,
-            SubmissionRow.assignment == mine.assignment,
-            SubmissionRow.attempt < mine.attempt,
+            SubmissionRow.enrolment_id == submission.enrolment_id,
+            SubmissionRow.assignment == submission.assignment,
+            SubmissionRow.attempt < submission.attempt,
             *current_grades.CAN_COUNT,
         )
         .order_by(SubmissionRow.attempt.desc())
         .limit(1)
     )
-    if found is None:
+    if previous_id is None:
         raise UsageError(f"no grade of the same student for the same assignment comes before {job_id}")
-    return found
+    return previous_id
 
 
 def list_batches(session: Session, course_id: int | None = None) -> list[BatchLine]:
@@ -168,13 +168,13 @@ def list_batches(session: Session, course_id: int | None = None) -> list[BatchLi
 
 
 def list_course_batches(
-    session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None
+    session: Session, course_id: int, limit: int, cursor: tuple[datetime, str] | None
 ) -> list[BatchLine]:
     """Return the next ``limit`` batches of a course, newest first, after the batch with this creation time and id."""
     query = select(Batch).where(Batch.course_id == course_id)
-    if after is not None:
-        earlier = and_(Batch.created_at == after[0], Batch.id > after[1])
-        query = query.where(or_(Batch.created_at < after[0], earlier))
+    if cursor is not None:
+        same_time = and_(Batch.created_at == cursor[0], Batch.id > cursor[1])
+        query = query.where(or_(Batch.created_at < cursor[0], same_time))
     rows = session.scalars(query.order_by(Batch.created_at.desc(), Batch.id).limit(limit)).all()
     return _build_batch_lines(session, rows)
 
@@ -214,14 +214,14 @@ def select_shown_submissions(batch_ids: Sequence[str]) -> Select[int]:
     )
 
 
-def load_job_lines(session: Session, batch_id: str, hidden: HiddenNames = NO_HIDDEN_NAMES) -> list[JobLine]:
+def load_job_lines(session: Session, batch_id: str, hidden_names: HiddenNames = NO_HIDDEN_NAMES) -> list[JobLine]:
     """Return the standing job of each submission of a batch, ordered by displayed student name.
 
     For a batch of regrades, returns its own jobs.
     """
     query = _select_job_lines().where(*match_standing_jobs(session, batch_id)).order_by(Enrolment.student, Job.id)
     lines = _restore_source_names(session, batch_id, [_build_job_line(row) for row in session.execute(query)])
-    return _sort_by_shown_name(lines, hidden)
+    return _sort_by_shown_name(lines, hidden_names)
 
 
 def load_attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
@@ -231,38 +231,38 @@ def load_attempt_lines(session: Session, batch_id: str) -> list[JobLine]:
 
 
 def load_job_lines_page(
-    session: Session, batch_id: str, hidden: HiddenNames, limit: int, after: str | None = None
+    session: Session, batch_id: str, hidden_names: HiddenNames, limit: int, last_id: str | None = None
 ) -> list[JobLine]:
     """Return at most ``limit`` job lines of a batch, after the job with this id.
 
     Hidden names are left out and do not affect the order.
     """
-    student = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
+    student = case((SubmissionRow.assignment.in_(hidden_names.assignments), ""), else_=Enrolment.student)
     query = _select_job_lines().where(*match_standing_jobs(session, batch_id)).order_by(student, Job.id).limit(limit)
-    if after is not None:
-        own = (
+    if last_id is not None:
+        last_student = (
             select(student)
             .select_from(Job)
             .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
             .join(Enrolment, Job.enrolment_id == Enrolment.id)
-            .where(Job.id == after)
+            .where(Job.id == last_id)
         )
-        query = query.where(tuple_(student, Job.id) > tuple_(own.correlate(None).scalar_subquery(), after))
+        query = query.where(tuple_(student, Job.id) > tuple_(last_student.correlate(None).scalar_subquery(), last_id))
     lines = _restore_source_names(session, batch_id, [_build_job_line(row) for row in session.execute(query)])
-    return [line.hide_name(hidden) for line in lines]
+    return [line.hide_name(hidden_names) for line in lines]
 
 
 def load_course_lines(
-    session: Session, course_id: int, assignments: Sequence[str], hidden: HiddenNames = NO_HIDDEN_NAMES
+    session: Session, course_id: int, assignments: Sequence[str], hidden_names: HiddenNames = NO_HIDDEN_NAMES
 ) -> list[JobLine]:
     """Return the current job of each student of a course for some assignments, in any batch or in none."""
     students = select(Enrolment.id).where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT)
-    ids = current_grades.select_shown_submissions(
+    submission_ids = current_grades.select_shown_submissions(
         SubmissionRow.assignment.in_(assignments), SubmissionRow.enrolment_id.in_(students)
     )
-    query = _select_job_lines().where(Job.submission_id.in_(ids), Job.standing == Standing.STANDS)
+    query = _select_job_lines().where(Job.submission_id.in_(submission_ids), Job.standing == Standing.STANDS)
     return _sort_by_shown_name(
-        [_build_job_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))], hidden
+        [_build_job_line(row) for row in session.execute(query.order_by(Enrolment.student, Job.id))], hidden_names
     )
 
 
@@ -276,30 +276,30 @@ def load_job_line(session: Session, job_id: str) -> JobLine:
 
 def load_progress(session: Session, batch_id: str) -> BatchProgress:
     """Return the progress of a batch."""
-    of_batch = Job.batch_id == batch_id
-    states = dict(session.execute(select(Job.state, func.count()).where(of_batch).group_by(Job.state)).all())
-    running = select(func.sum(Job.progress)).where(of_batch, Job.state == JobState.RUNNING)
-    waiting = select(func.count()).select_from(Job).where(of_batch, Job.plots == PlotState.DUE)
+    is_in_batch = Job.batch_id == batch_id
+    states = dict(session.execute(select(Job.state, func.count()).where(is_in_batch).group_by(Job.state)).all())
+    running_progress = select(func.sum(Job.progress)).where(is_in_batch, Job.state == JobState.RUNNING)
+    due_plots = select(func.count()).select_from(Job).where(is_in_batch, Job.plots == PlotState.DUE)
     return BatchProgress(
         jobs=sum(states.values()),
         ended=sum(count for state, count in states.items() if state not in UNFINISHED),
-        partial=session.scalar(running) or 0.0,
-        plots_due=session.scalar(waiting) or 0,
+        partial=session.scalar(running_progress) or 0.0,
+        plots_due=session.scalar(due_plots) or 0,
     )
 
 
 def _build_batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLine]:
-    ids = [row.id for row in rows]
-    opened = session.scalars(select(OpenAssignment).where(OpenAssignment.batch_id.in_(ids)))
-    of_the_web = {row.batch_id: row for row in opened if row.batch_id is not None}
+    batch_ids = [row.id for row in rows]
+    open_assignments = session.scalars(select(OpenAssignment).where(OpenAssignment.batch_id.in_(batch_ids)))
+    web_assignments = {row.batch_id: row for row in open_assignments if row.batch_id is not None}
     # Submissions graded by a quarantined worker have a second job in the batch.
-    counted = select(Job.batch_id, Job.state, func.count()).where(
-        Job.batch_id.in_([own for own in ids if own not in of_the_web]), Job.suspect.is_(None)
+    job_counts = select(Job.batch_id, Job.state, func.count()).where(
+        Job.batch_id.in_([own for own in batch_ids if own not in web_assignments]), Job.suspect.is_(None)
     )
     states: dict[str | None, dict[JobState, int]] = {row.id: {} for row in rows}
-    for batch_id, state, count in session.execute(counted.group_by(Job.batch_id, Job.state)):
+    for batch_id, state, count in session.execute(job_counts.group_by(Job.batch_id, Job.state)):
         states[batch_id][state] = count
-    if of_the_web:
+    if web_assignments:
         member = aliased(SubmissionRow)
         attempts = (
             select(member.batch_id, Job.state, func.count(SubmissionRow.id.distinct()))
@@ -309,10 +309,12 @@ def _build_batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLin
                 and_(
                     member.enrolment_id == SubmissionRow.enrolment_id,
                     member.assignment == SubmissionRow.assignment,
-                    member.batch_id.in_(list(of_the_web)),
+                    member.batch_id.in_(list(web_assignments)),
                 ),
             )
-            .where(Job.submission_id.in_(select_shown_submissions(list(of_the_web))), Job.standing == Standing.STANDS)
+            .where(
+                Job.submission_id.in_(select_shown_submissions(list(web_assignments))), Job.standing == Standing.STANDS
+            )
         )
         for batch_id, state, count in session.execute(attempts.group_by(member.batch_id, Job.state)):
             states[batch_id][state] = count
@@ -326,21 +328,23 @@ def _build_batch_lines(session: Session, rows: Sequence[Batch]) -> list[BatchLin
             sum(states[row.id].values()),
             states[row.id],
             row.regrade_of,
-            of_the_web[row.id].assignment if row.id in of_the_web else None,
-            row.id in of_the_web and of_the_web[row.id].closed_at is None,
+            web_assignments[row.id].assignment if row.id in web_assignments else None,
+            row.id in web_assignments and web_assignments[row.id].closed_at is None,
         )
         for row in rows
     ]
 
 
-def _find_by_prefix(session: Session, column: InstrumentedAttribute[str], newest: Any, start: str, what: str) -> str:
-    found = session.scalars(select(column).where(column.startswith(start, autoescape=True)).limit(2)).all()
-    if not found:
-        known = session.scalars(select(column).order_by(newest.desc()).limit(_MOST_COMPARED))
-        raise UsageError(f"there is no {what} {start!r}{suggest_name(start, known)}")
-    if len(found) > 1:
-        raise UsageError(f"more than one {what} begins with {start!r}; give more of its id")
-    return found[0]
+def _find_by_prefix(
+    session: Session, column: InstrumentedAttribute[str], newest_column: Any, prefix: str, subject: str
+) -> str:
+    matches = session.scalars(select(column).where(column.startswith(prefix, autoescape=True)).limit(2)).all()
+    if not matches:
+        newest_ids = session.scalars(select(column).order_by(newest_column.desc()).limit(_MOST_COMPARED))
+        raise UsageError(f"there is no {subject} {prefix!r}{suggest_name(prefix, newest_ids)}")
+    if len(matches) > 1:
+        raise UsageError(f"more than one {subject} begins with {prefix!r}; give more of its id")
+    return matches[0]
 
 
 def _select_job_lines() -> Select[*_JobColumns]:
@@ -353,10 +357,10 @@ def _select_job_lines() -> Select[*_JobColumns]:
         .limit(1)
         .scalar_subquery()
     )
-    unjudged = (
+    has_unjudged = (
         select(func.count()).where(CriterionResultRow.job_id == Job.id, overrides.match_unjudged()).scalar_subquery()
     )
-    by_hand = (
+    has_override = (
         select(func.count())
         .where(Override.submission_id == Job.submission_id, Override.withdrawn_at.is_(None))
         .scalar_subquery()
@@ -374,8 +378,8 @@ def _select_job_lines() -> Select[*_JobColumns]:
             accuracy,
             SubmissionRow.staff_only,
             SubmissionRow.days_late,
-            unjudged,
-            by_hand,
+            has_unjudged,
+            has_override,
             surprises,
             SubmissionRow.batch_id,
             current_grades.select_newer_attempt(),
@@ -388,7 +392,7 @@ def _select_job_lines() -> Select[*_JobColumns]:
 
 def _build_job_line(row: Row[*_JobColumns]) -> JobLine:
     job, student, name, email, source, version, attempt, accuracy, staff_only, days_late = row[:10]
-    unjudged, by_hand, surprises, batch_id, newer_attempt = row[10:]
+    has_unjudged, has_override, surprises, batch_id, newer_attempt = row[10:]
     return JobLine(
         id=job.id,
         submission_id=job.submission_id,
@@ -416,8 +420,8 @@ def _build_job_line(row: Row[*_JobColumns]) -> JobLine:
         copied_from=job.copied_from,
         suspect=job.suspect,
         staff_only=staff_only,
-        unjudged=unjudged or 0,
-        set_by_hand=by_hand or 0,
+        unjudged=has_unjudged or 0,
+        set_by_hand=has_override or 0,
         surprises=surprises or 0,
         days_late=days_late,
         published_at=job.published_at,

@@ -36,52 +36,56 @@ class ClassOverview:
 
 
 def compute_overviews(
-    session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden: HiddenNames
+    session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden_names: HiddenNames
 ) -> tuple[ClassOverview, ...]:
     """Return the overview of each assignment in the rows of a batch."""
-    graded = [line for line in lines if current_grades.is_for_students(line)]
-    found = []
-    counted = load_marked_submissions(session, graded)
-    for statistics in compute_statistics(counted):
+    graded_lines = [line for line in lines if current_grades.is_for_students(line)]
+    overviews = []
+    marked_submissions = load_marked_submissions(session, graded_lines)
+    for statistics in compute_statistics(marked_submissions):
         # A student excused from everything has no marks, so neither passes nor fails.
-        own = [line for line in graded if line.assignment == statistics.assignment and line.share >= 0]
-        marks = (each.marks for each in counted if each.assignment == statistics.assignment)
-        taken = [MarksAndTime(line.id, line.share, line.seconds) for line in own]
-        found.append(
+        assignment_lines = [
+            line for line in graded_lines if line.assignment == statistics.assignment and line.share >= 0
+        ]
+        marks = (each.marks for each in marked_submissions if each.assignment == statistics.assignment)
+        marks_and_times = [MarksAndTime(line.id, line.share, line.seconds) for line in assignment_lines]
+        overviews.append(
             ClassOverview(
                 statistics,
                 compute_distribution(marks, statistics.max_marks),
-                sum(line.share >= pass_share for line in own),
-                find_outliers(taken, pass_share),
+                sum(line.share >= pass_share for line in assignment_lines),
+                find_outliers(marks_and_times, pass_share),
                 _group_identical([line for line in lines if line.assignment == statistics.assignment]),
-                load_missing_students(session, course_id, statistics.assignment, hidden),
+                load_missing_students(session, course_id, statistics.assignment, hidden_names),
             )
         )
-    return tuple(found)
+    return tuple(overviews)
 
 
 def _group_identical(lines: Sequence[TableLine]) -> tuple[tuple[TableLine, ...], ...]:
-    of_bytes: dict[str, list[TableLine]] = {}
+    lines_by_digest: dict[str, list[TableLine]] = {}
     for line in lines:
         if line.state != REFUSED:
-            of_bytes.setdefault(line.sha256, []).append(line)
-    return tuple(tuple(same) for same in of_bytes.values() if len(same) > 1)
+            lines_by_digest.setdefault(line.sha256, []).append(line)
+    return tuple(tuple(same) for same in lines_by_digest.values() if len(same) > 1)
 
 
 def load_missing_students(
-    session: Session, course_id: int, assignment: str, hidden: HiddenNames
+    session: Session, course_id: int, assignment: str, hidden_names: HiddenNames
 ) -> tuple[Student, ...]:
     """Return the students of a course without a submission for an assignment.
 
     If names are hidden, labels are returned: a real name that leaves this list would identify the new row.
     """
-    of_student = (SubmissionRow.enrolment_id == Enrolment.id, SubmissionRow.assignment == assignment)
+    is_submission = (SubmissionRow.enrolment_id == Enrolment.id, SubmissionRow.assignment == assignment)
     query = (
         select(Enrolment.student, Enrolment.name)
-        .where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT, ~exists().where(*of_student))
+        .where(Enrolment.course_id == course_id, Enrolment.role == Role.STUDENT, ~exists().where(*is_submission))
         .order_by(Enrolment.student)
     )
-    found = [Student(student, name) for student, name in session.execute(query)]
-    if assignment not in hidden.assignments:
-        return tuple(found)
-    return tuple(Student(label) for label in sorted(hidden.label_student(assignment, each.id) for each in found))
+    students = [Student(student, name) for student, name in session.execute(query)]
+    if assignment not in hidden_names.assignments:
+        return tuple(students)
+    return tuple(
+        Student(label) for label in sorted(hidden_names.label_student(assignment, each.id) for each in students)
+    )

@@ -103,7 +103,7 @@ def accept_submission(
     max_attempts: int,
     lane: JobQueue = JobQueue.INTERACTIVE,
     batch_id: str | None = None,
-    most_bytes: int | None = None,
+    max_bytes: int | None = None,
     enrolment_id: int | None = None,
 ) -> AcceptedSubmission:
     """Accept one interactive submission. If an identical submission is graded, its grade is copied immediately.
@@ -111,32 +111,39 @@ def accept_submission(
     Without a submission time in the request, the current time is used. Of the submissions over a limit only the newest
     is kept, ungraded until staff ask for it.
 
-    ``most_bytes`` limits the total size of the student's submissions to the assignment; set it when students submit
+    ``max_bytes`` limits the total size of the student's submissions to the assignment; set it when students submit
     themselves. With ``enrolment_id``, the signed-in student must be enrolled under that id, and the assignment open.
 
     Raises UsageError if the student is ambiguous, exceeds the size limit or is no longer enrolled, or if the assignment
     is closed.
     """
-    (packed,) = _pack_requests([grading_request])
+    (packed_request,) = _pack_requests([grading_request])
     secret = load_secret(store).sha256
     with store.transaction() as session:
-        at = now(session)
-        packed = replace(
-            packed, grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or at)
+        current_time = now(session)
+        packed_request = replace(
+            packed_request,
+            grading_request=replace(grading_request, submitted_at=grading_request.submitted_at or current_time),
         )
         terms = _IntakeTerms(
-            ensure_course(session, course, at), lane, max_attempts, at, secret, batch_id, most_bytes=most_bytes
+            ensure_course(session, course, current_time),
+            lane,
+            max_attempts,
+            current_time,
+            secret,
+            batch_id,
+            most_bytes=max_bytes,
         )
         students = Students(session, terms.course_id)
         if enrolment_id is None:
-            enrolment_id = students.enrol(grading_request.student, at)
+            enrolment_id = students.enrol(grading_request.student, current_time)
         elif not students.is_enrolled(enrolment_id, grading_request.student):
             raise UsageError("you are no longer a student of this course, so nothing was submitted.")
         else:
             # The lock of the course keeps it open until the submission is stored.
             opened = open_assignments.load_course_assignment(session, terms.course_id, grading_request.assignment.id)
             open_assignments.check_open(opened)
-        return _accept_item(session, _IntakeItem(packed, enrolment_id), terms)
+        return _accept_item(session, _IntakeItem(packed_request, enrolment_id), terms)
 
 
 @retry_conflicts
@@ -155,18 +162,24 @@ def accept_batch(
     ``refusals`` were found when the batch was read. ``record`` is called with the accepted batch in the same
     transaction. Raises UsageError if all remaining submissions are rejected.
     """
-    packed = _pack_requests(grading_requests)
+    packed_requests = _pack_requests(grading_requests)
     secret = load_secret(store).sha256
     with store.transaction() as session:
-        at = now(session)
-        terms = _IntakeTerms(ensure_course(session, course, at), JobQueue.BATCH, max_attempts, at, secret, anew=True)
-        items, refused = _enrol_students(session, packed, terms)
-        if refused and not items:
-            raise UsageError(f"no submission can be accepted; {refused[0].source}: {refused[0].reason}")
-        made = replace(_accept_batch(session, items, name, [*refusals, *refused], terms), refused=refused)
+        current_time = now(session)
+        terms = _IntakeTerms(
+            ensure_course(session, course, current_time), JobQueue.BATCH, max_attempts, current_time, secret, anew=True
+        )
+        items, enrolment_refusals = _enrol_students(session, packed_requests, terms)
+        if enrolment_refusals and not items:
+            raise UsageError(
+                f"no submission can be accepted; {enrolment_refusals[0].source}: {enrolment_refusals[0].reason}"
+            )
+        accepted_batch = replace(
+            _accept_batch(session, items, name, [*refusals, *enrolment_refusals], terms), refused=enrolment_refusals
+        )
         if record is not None:
-            record(session, BatchIntake(made, (), refused))
-        return made
+            record(session, BatchIntake(accepted_batch, (), enrolment_refusals))
+        return accepted_batch
 
 
 @retry_conflicts
@@ -186,22 +199,26 @@ def accept_new_submissions(
     Cancelled submissions are accepted again. A new submission that is identical to a graded one gets that grade
     immediately. ``record`` is called in the same transaction if a batch is created.
     """
-    packed = _pack_requests(grading_requests)
+    packed_requests = _pack_requests(grading_requests)
     secret = load_secret(store).sha256
     with store.transaction() as session:
-        at = now(session)
-        terms = _IntakeTerms(ensure_course(session, course, at), JobQueue.BATCH, max_attempts, at, secret)
-        items, refused = _enrol_students(session, packed, terms)
-        found = [
+        current_time = now(session)
+        terms = _IntakeTerms(
+            ensure_course(session, course, current_time), JobQueue.BATCH, max_attempts, current_time, secret
+        )
+        items, enrolment_refusals = _enrol_students(session, packed_requests, terms)
+        known_submissions = [
             find_known_submission(session, item.packed.grading_request, item.enrolment_id, item.packed.frozen.sha256)
             for item in items
         ]
-        new = [item for item, known in zip(items, found, strict=True) if known is None]
-        batch = _accept_batch(session, new, name, [*refusals, *refused], terms) if new else None
-        accepted = BatchIntake(batch, tuple(known for known in found if known is not None), refused)
+        new_items = [item for item, known in zip(items, known_submissions, strict=True) if known is None]
+        batch = _accept_batch(session, new_items, name, [*refusals, *enrolment_refusals], terms) if new_items else None
+        batch_intake = BatchIntake(
+            batch, tuple(known for known in known_submissions if known is not None), enrolment_refusals
+        )
         if record is not None and batch is not None:
-            record(session, accepted)
-        return accepted
+            record(session, batch_intake)
+        return batch_intake
 
 
 def load_grading_request(session: Session, job_id: str) -> GradingRequest:
@@ -219,8 +236,8 @@ def load_grading_request(session: Session, job_id: str) -> GradingRequest:
 
 def load_submission(session: Session, job_id: str) -> Submission:
     """Return the submission of a job; raises like ``load_grading_request``."""
-    kept = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
-    return _unpack_stored(unpack_submission, session.scalar(kept.where(Job.id == job_id)), "submission", job_id)
+    query = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
+    return _unpack_stored(unpack_submission, session.scalar(query.where(Job.id == job_id)), "submission", job_id)
 
 
 def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Submission]]:
@@ -230,23 +247,23 @@ def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator
     """
     query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
-    for job_id, kept in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
-        yield job_id, _unpack_stored(unpack_submission, kept, "submission", job_id)
+    for job_id, packed_submission in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+        yield job_id, _unpack_stored(unpack_submission, packed_submission, "submission", job_id)
 
 
 def load_assignment(session: Session, job_id: str) -> Assignment:
     """Return the assignment version of a job; raises like ``load_grading_request``."""
-    kept = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
-    return _unpack_stored(assignment_from_bytes, session.scalar(kept.where(Job.id == job_id)), "assignment", job_id)
+    query = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
+    return _unpack_stored(assignment_from_bytes, session.scalar(query.where(Job.id == job_id)), "assignment", job_id)
 
 
-def _unpack_stored(read: Callable[[bytes], Read], kept: bytes | None, what: str, job_id: str) -> Read:
-    if kept is None:
+def _unpack_stored(decode_content: Callable[[bytes], Read], content: bytes | None, subject: str, job_id: str) -> Read:
+    if content is None:
         raise UsageError(f"there is no job {job_id}")
     try:
-        return read(kept)
+        return decode_content(content)
     except (UsageError, ValueError, TypeError, KeyError) as error:
-        raise HostError(f"The {what} of {job_id} cannot be read back: {error}") from error
+        raise HostError(f"The {subject} of {job_id} cannot be read back: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,36 +297,42 @@ class _IntakeTerms:
 
 def _pack_requests(grading_requests: Sequence[GradingRequest]) -> list[_PackedRequest]:
     """Prepare the stored form of each submission, before the transaction and once per assignment."""
-    frozen: dict[int, FrozenAssignment] = {}
-    packed = []
+    frozen_assignments: dict[int, FrozenAssignment] = {}
+    packed_requests = []
     for grading_request in grading_requests:
         key = id(grading_request.assignment)
-        if key not in frozen:
-            frozen[key] = freeze_assignment(grading_request.assignment)
-        packed.append(_PackedRequest(grading_request, pack_submission(grading_request.submission), frozen[key]))
-    return packed
+        if key not in frozen_assignments:
+            frozen_assignments[key] = freeze_assignment(grading_request.assignment)
+        packed_requests.append(
+            _PackedRequest(grading_request, pack_submission(grading_request.submission), frozen_assignments[key])
+        )
+    return packed_requests
 
 
 def _enrol_students(
-    session: Session, packed: Sequence[_PackedRequest], terms: _IntakeTerms
+    session: Session, packed_requests: Sequence[_PackedRequest], terms: _IntakeTerms
 ) -> tuple[list[_IntakeItem], tuple[RejectedSubmission, ...]]:
     """Return the submissions with their enrolments, and the rejections of students who are ambiguous."""
     students = Students(session, terms.course_id)
-    items, refused = [], []
-    for each in packed:
-        asked = each.grading_request
+    items, refusals = [], []
+    for packed_request in packed_requests:
+        grading_request = packed_request.grading_request
         try:
-            items.append(_IntakeItem(each, students.enrol(asked.student, terms.at)))
+            items.append(_IntakeItem(packed_request, students.enrol(grading_request.student, terms.at)))
         except UsageError as error:
-            refused.append(RejectedSubmission(asked.source, str(error), asked.student, asked.assignment.id))
-    return items, tuple(refused)
+            refusals.append(
+                RejectedSubmission(
+                    grading_request.source, str(error), grading_request.student, grading_request.assignment.id
+                )
+            )
+    return items, tuple(refusals)
 
 
 def find_known_submission(
     session: Session, grading_request: GradingRequest, enrolment_id: int, assignment_sha256: str
 ) -> KnownSubmission | None:
     """Return the job of the student's newest submission if it is identical; None for a new submission."""
-    newest = session.scalar(
+    newest_row = session.scalar(
         select(SubmissionRow)
         .where(
             SubmissionRow.enrolment_id == enrolment_id,
@@ -318,14 +341,14 @@ def find_known_submission(
         .order_by(SubmissionRow.attempt.desc())
         .limit(1)
     )
-    if newest is None or newest.sha256 != grading_request.submission.sha256:
+    if newest_row is None or newest_row.sha256 != grading_request.submission.sha256:
         return None
     query = (
         select(Job)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
         .where(
-            Job.submission_id == newest.id,
+            Job.submission_id == newest_row.id,
             AssignmentVersion.sha256 == assignment_sha256,
             Job.state != JobState.CANCELLED,
             # A dead job of a cancelled batch cannot be retried, so its submission is accepted again.
@@ -339,7 +362,7 @@ def find_known_submission(
     if job is None:
         return None
     other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, hash_grader())
-    student, assignment = grading_request.submission.student, newest.assignment
+    student, assignment = grading_request.submission.student, newest_row.assignment
     return KnownSubmission(job.id, job.batch_id, student, assignment, job.state, other_grader)
 
 
@@ -359,44 +382,44 @@ def _accept_batch(
     places: defaultdict[tuple[int, str], bytes] = defaultdict(lambda: secrets.token_bytes(16))
     keys = [places[item.enrolment_id, item.packed.grading_request.assignment.id] for item in items]
     order = sorted(range(len(items)), key=keys.__getitem__)
-    taken = {number: _accept_item(session, items[number], terms) for number in order}
-    accepted = AcceptedBatch(batch.id, tuple(taken[number] for number in range(len(items))))
+    accepted_items = {number: _accept_item(session, items[number], terms) for number in order}
+    accepted_batch = AcceptedBatch(batch.id, tuple(accepted_items[number] for number in range(len(items))))
     outbox.emit_batch_finished(session, batch.id)
-    return accepted
+    return accepted_batch
 
 
 def _accept_item(session: Session, item: _IntakeItem, terms: _IntakeTerms) -> AcceptedSubmission:
-    packed, enrolment_id, at = item.packed, item.enrolment_id, terms.at
-    grading_request = packed.grading_request
+    packed_request, enrolment_id, current_time = item.packed, item.enrolment_id, terms.at
+    grading_request = packed_request.grading_request
     submission, assignment = grading_request.submission, grading_request.assignment
-    version_id = store_version(session, packed.frozen, at)
-    of_student = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
-    earlier = session.scalar(select(func.max(SubmissionRow.attempt)).where(*of_student)) or 0
+    version_id = store_version(session, packed_request.frozen, current_time)
+    is_earlier = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment.id)
+    previous_attempts = session.scalar(select(func.max(SubmissionRow.attempt)).where(*is_earlier)) or 0
     # A claim skips locked jobs: no job starts between the ruling, which counts only started jobs, and being
     # superseded.
-    waiting = (Job.state == JobState.QUEUED, Job.submission_id.in_(select(SubmissionRow.id).where(*of_student)))
-    lock_jobs(session, *waiting)
+    queued_jobs = (Job.state == JobState.QUEUED, Job.submission_id.in_(select(SubmissionRow.id).where(*is_earlier)))
+    lock_jobs(session, *queued_jobs)
     ruling = Ruling()
     if not terms.anew:
         ruling = apply_policy(session, enrolment_id, assignment.id, submission.sha256, grading_request.submitted_at)
-    put_aside = ruling.over is not None and terms.most_bytes is not None
-    if put_aside:
-        _delete_put_aside(session, of_student)
+    is_put_aside = ruling.over is not None and terms.most_bytes is not None
+    if is_put_aside:
+        _delete_put_aside(session, is_earlier)
     if terms.most_bytes is not None:
-        _check_quota(session, of_student, len(packed.data), terms.most_bytes)
+        _check_quota(session, is_earlier, len(packed_request.data), terms.most_bytes)
     job_id = generate_id()
     if not ruling.over:
-        jobs.supersede_jobs(session, select(SubmissionRow.id).where(*of_student), job_id, at)
+        jobs.supersede_jobs(session, select(SubmissionRow.id).where(*is_earlier), job_id, current_time)
     row = SubmissionRow(
         enrolment_id=enrolment_id,
         assignment=assignment.id,
         batch_id=terms.batch_id,
-        attempt=earlier + 1,
+        attempt=previous_attempts + 1,
         sha256=submission.sha256,
         source=grading_request.source,
-        size=len(packed.data),
-        packed=packed.data,
-        created_at=at,
+        size=len(packed_request.data),
+        packed=packed_request.data,
+        created_at=current_time,
         submitted_at=grading_request.submitted_at,
         days_late=ruling.days_late,
         staff_only=str(ruling.over) if ruling.over else None,
@@ -415,53 +438,53 @@ def _accept_item(session: Session, item: _IntakeItem, terms: _IntakeTerms) -> Ac
         max_attempts=terms.max_attempts,
         forced=terms.anew,
     )
-    jobs.enqueue(session, job, at)
-    if put_aside:
-        jobs.put_aside_job(session, job_id, at)
+    jobs.enqueue(session, job, current_time)
+    if is_put_aside:
+        jobs.put_aside_job(session, job_id, current_time)
     source = (
         None
-        if terms.anew or put_aside
+        if terms.anew or is_put_aside
         else result_cache.find_cached_grade(
             session, result_cache.compute_cache_key(session, job_id, hash_grader(), terms.secret_sha256)
         )
     )
     if source is not None:
-        jobs.copy_grade(session, job_id, source, at)
+        jobs.copy_grade(session, job_id, source, current_time)
     return AcceptedSubmission(
         job_id, row.id, submission.student, assignment.id, row.attempt, source, row.staff_only or ""
     )
 
 
-def _delete_put_aside(session: Session, of_student: tuple[ColumnElement[bool], ...]) -> None:
+def _delete_put_aside(session: Session, is_earlier: tuple[ColumnElement[bool], ...]) -> None:
     """Remove earlier submissions over a limit that staff never asked to grade; only the newest is kept.
 
     Submissions with a comment are kept, too.
     """
-    own = select(SubmissionRow.id).where(*of_student, SubmissionRow.staff_only.is_not(None))
-    waiting = (
-        Job.submission_id.in_(own),
+    own_submissions = select(SubmissionRow.id).where(*is_earlier, SubmissionRow.staff_only.is_not(None))
+    put_aside_jobs = (
+        Job.submission_id.in_(own_submissions),
         Job.state == JobState.CANCELLED,
         Job.cancelled_for == CancelReason.OVER_LIMIT,
     )
     # Without the lock, staff could ask for one between the choice and the deletion.
-    lock_jobs(session, *waiting)
-    gone = session.scalars(select(Job.submission_id).where(*waiting)).all()
+    lock_jobs(session, *put_aside_jobs)
+    submission_ids = session.scalars(select(Job.submission_id).where(*put_aside_jobs)).all()
     # A submission that was graded before and requested again has other jobs.
     other_reason = Job.cancelled_for.is_distinct_from(CancelReason.OVER_LIMIT)
-    others = select(Job.submission_id).where(Job.submission_id.in_(gone), other_reason)
-    kept = set(session.scalars(others))
-    kept.update(session.scalars(select(Comment.submission_id).where(Comment.submission_id.in_(gone))))
-    ids = [each for each in gone if each not in kept]
-    session.execute(delete(Job).where(Job.submission_id.in_(ids), *waiting))
-    session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(ids)))
+    other_jobs = select(Job.submission_id).where(Job.submission_id.in_(submission_ids), other_reason)
+    kept_ids = set(session.scalars(other_jobs))
+    kept_ids.update(session.scalars(select(Comment.submission_id).where(Comment.submission_id.in_(submission_ids))))
+    removed_ids = [each for each in submission_ids if each not in kept_ids]
+    session.execute(delete(Job).where(Job.submission_id.in_(removed_ids), *put_aside_jobs))
+    session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(removed_ids)))
 
 
-def _check_quota(session: Session, of_student: tuple[ColumnElement[bool], ...], size: int, most: int) -> None:
-    used = session.scalar(select(func.coalesce(func.sum(SubmissionRow.size), 0)).where(*of_student)) or 0
-    if used + size > most:
+def _check_quota(session: Session, is_earlier: tuple[ColumnElement[bool], ...], size: int, max_bytes: int) -> None:
+    used_bytes = session.scalar(select(func.coalesce(func.sum(SubmissionRow.size), 0)).where(*is_earlier)) or 0
+    if used_bytes + size > max_bytes:
         raise UsageError(
             "your submissions to this assignment would need %(size)s MB, but the limit is %(most)s MB in total; "
             "remove unneeded files, or ask your instructor.",
-            size=-(-(used + size) // MEGABYTE),
-            most=most // MEGABYTE,
+            size=-(-(used_bytes + size) // MEGABYTE),
+            most=max_bytes // MEGABYTE,
         )

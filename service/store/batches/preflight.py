@@ -32,24 +32,24 @@ def preview_intake(
     course_id: int,
     grading_requests: Sequence[GradingRequest],
     secret_sha256: str,
-    nameless: Collection[str] = (),
+    hidden_assignments: Collection[str] = (),
 ) -> list[IntakePreview]:
     """Return a preview of each grading request, in their order.
 
-    For the assignments in ``nameless``, whose students' names are hidden, it does not depend on what the student
-    submitted. Otherwise the files of a row under each name in turn would tell whose row it is.
+    For the assignments in ``hidden_assignments``, whose students' names are hidden, it does not depend on what the
+    student submitted. Otherwise the files of a row under each name in turn would tell whose row it is.
     """
     students = Students(session, course_id)
     versions = {id(each.assignment): each.assignment for each in grading_requests}
-    frozen = {key: freeze_assignment(assignment).sha256 for key, assignment in versions.items()}
+    digests = {key: freeze_assignment(assignment).sha256 for key, assignment in versions.items()}
     return [
         _preview_request(
             session,
             students.find_enrolment(each.student),
             each,
-            frozen[id(each.assignment)],
+            digests[id(each.assignment)],
             secret_sha256,
-            may_be_known=each.assignment.id not in nameless,
+            may_be_known=each.assignment.id not in hidden_assignments,
         )
         for each in grading_requests
     ]
@@ -58,7 +58,7 @@ def preview_intake(
 def _preview_request(
     session: Session,
     enrolment_id: int | None,
-    asked: GradingRequest,
+    grading_request: GradingRequest,
     assignment_sha256: str,
     secret_sha256: str,
     *,
@@ -67,10 +67,12 @@ def _preview_request(
     if (
         may_be_known
         and enrolment_id is not None
-        and intake.find_known_submission(session, asked, enrolment_id, assignment_sha256)
+        and intake.find_known_submission(session, grading_request, enrolment_id, assignment_sha256)
     ):
         return IntakePreview(enrolled=True, known=True, copied=False)
-    key = result_cache.combine_cache_key(asked.submission.sha256, assignment_sha256, hash_grader(), secret_sha256)
+    key = result_cache.combine_cache_key(
+        grading_request.submission.sha256, assignment_sha256, hash_grader(), secret_sha256
+    )
     return IntakePreview(
         enrolment_id is not None, known=False, copied=result_cache.find_cached_grade(session, key) is not None
     )

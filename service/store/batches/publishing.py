@@ -39,33 +39,39 @@ class PublicationPreview:
     students: int
 
 
-def publish_batch(session: Session, batch_id: str, *, actor: str, anyway: bool = False) -> PublicationCounts:
+def publish_batch(session: Session, batch_id: str, *, actor: str, includes_unjudged: bool = False) -> PublicationCounts:
     """Publish the standing grades of a batch. The newest regrade of each submission becomes its standing grade first.
 
-    Grades that are suspect, over a limit or have an unjudged criterion are not published. ``anyway`` includes those
-    with an unjudged criterion.
+    Grades that are suspect, over a limit or have an unjudged criterion are not published. ``includes_unjudged``
+    includes those with an unjudged criterion.
     """
-    return _publish_grades(session, _select_batch_submissions(batch_id), actor=actor, anyway=anyway)
+    return _publish_grades(
+        session, _select_batch_submissions(batch_id), actor=actor, includes_unjudged=includes_unjudged
+    )
 
 
-def publish_grade(session: Session, job_id: str, *, actor: str, anyway: bool = False) -> PublicationCounts:
+def publish_grade(session: Session, job_id: str, *, actor: str, includes_unjudged: bool = False) -> PublicationCounts:
     """Publish the grade of one submission, selected by a job, like ``publish``."""
-    return _publish_grades(session, select(Job.submission_id).where(Job.id == job_id), actor=actor, anyway=anyway)
+    return _publish_grades(
+        session, select(Job.submission_id).where(Job.id == job_id), actor=actor, includes_unjudged=includes_unjudged
+    )
 
 
 def preview_publication(session: Session, batch_id: str) -> PublicationPreview:
     """Return the effect of ``publish`` on a batch, without ``anyway``. Read-only."""
-    ids = _select_batch_submissions(batch_id)
-    plan = _build_plan(session, session.scalars(_select_gradings(ids)).all(), ids, anyway=False)
+    submission_ids = _select_batch_submissions(batch_id)
+    plan = _build_plan(
+        session, session.scalars(_select_gradings(submission_ids)).all(), submission_ids, includes_unjudged=False
+    )
     return PublicationPreview(plan.counts, len({job.enrolment_id for job in plan.released}))
 
 
 def count_unpublished_regrades(session: Session, batch_id: str) -> int:
     """Return the number of submissions of a batch with a finished regrade that is not published yet."""
-    proposed = (Job.standing == Standing.PROPOSED, *current_grades.IS_TRUSTED)
+    is_proposed = (Job.standing == Standing.PROPOSED, *current_grades.IS_TRUSTED)
     query = (
         select(Job.submission_id)
-        .where(Job.submission_id.in_(_select_batch_submissions(batch_id)), *proposed)
+        .where(Job.submission_id.in_(_select_batch_submissions(batch_id)), *is_proposed)
         .distinct()
     )
     return len(session.scalars(query).all())
@@ -85,13 +91,15 @@ def _select_batch_submissions(batch_id: str) -> Select[int]:
     return select(Job.submission_id).where(Job.batch_id == batch_id)
 
 
-def _publish_grades(session: Session, ids: Select[int], *, actor: str, anyway: bool) -> PublicationCounts:
-    at = now(session)
-    lock_submissions(session, SubmissionRow.id.in_(ids))
-    lock_jobs(session, Job.submission_id.in_(ids))
+def _publish_grades(
+    session: Session, submission_ids: Select[int], *, actor: str, includes_unjudged: bool
+) -> PublicationCounts:
+    current_time = now(session)
+    lock_submissions(session, SubmissionRow.id.in_(submission_ids))
+    lock_jobs(session, Job.submission_id.in_(submission_ids))
     # Jobs that were read before the lock may have changed.
-    gradings = session.scalars(_select_gradings(ids).execution_options(populate_existing=True)).all()
-    plan = _build_plan(session, gradings, ids, anyway=anyway)
+    gradings = session.scalars(_select_gradings(submission_ids).execution_options(populate_existing=True)).all()
+    plan = _build_plan(session, gradings, submission_ids, includes_unjudged=includes_unjudged)
     for job in plan.outdated:
         job.standing = Standing.KEPT
     # The database rejects a second standing job of a submission, even within a transaction.
@@ -99,65 +107,67 @@ def _publish_grades(session: Session, ids: Select[int], *, actor: str, anyway: b
     for job in plan.standing:
         job.standing = Standing.STANDS
     for job in plan.released:
-        job.published_at, job.published_by = at, actor
+        job.published_at, job.published_by = current_time, actor
     return plan.counts
 
 
-def _select_gradings(ids: Select[int]) -> Select[Job]:
-    query = select(Job).where(Job.submission_id.in_(ids), Job.standing != Standing.KEPT)
+def _select_gradings(submission_ids: Select[int]) -> Select[Job]:
+    query = select(Job).where(Job.submission_id.in_(submission_ids), Job.standing != Standing.KEPT)
     return query.order_by(Job.queued_at, Job.id)
 
 
-def _build_plan(session: Session, gradings: Sequence[Job], ids: Select[int], *, anyway: bool) -> _Plan:
-    of_submission: dict[int, list[Job]] = {}
+def _build_plan(
+    session: Session, gradings: Sequence[Job], submission_ids: Select[int], *, includes_unjudged: bool
+) -> _Plan:
+    jobs_by_submission: dict[int, list[Job]] = {}
     for job in gradings:
-        of_submission.setdefault(job.submission_id, []).append(job)
-    over = (SubmissionRow.id.in_(ids), SubmissionRow.staff_only.is_not(None))
-    hidden = set(session.scalars(select(SubmissionRow.id).where(*over)))
-    unjudged = set() if anyway else _load_unjudged_jobs(session, ids)
-    released, standing, outdated, left = [], [], [], []
-    for submission_id, jobs in of_submission.items():
-        stands, giving_way = _choose_standing_job(jobs, unjudged)
-        outdated += giving_way
-        left += [job for job in jobs if job not in giving_way]
-        if stands is not None and stands.standing is Standing.PROPOSED:
-            standing.append(stands)
-        if stands is not None and stands.published_at is None and submission_id not in hidden:
-            released.append(stands)
+        jobs_by_submission.setdefault(job.submission_id, []).append(job)
+    over_limit = (SubmissionRow.id.in_(submission_ids), SubmissionRow.staff_only.is_not(None))
+    hidden_submissions = set(session.scalars(select(SubmissionRow.id).where(*over_limit)))
+    unjudged_ids = set() if includes_unjudged else _load_unjudged_jobs(session, submission_ids)
+    released_jobs, proposed_jobs, outdated_jobs, remaining_jobs = [], [], [], []
+    for submission_id, jobs in jobs_by_submission.items():
+        standing_job, replaced_jobs = _choose_standing_job(jobs, unjudged_ids)
+        outdated_jobs += replaced_jobs
+        remaining_jobs += [job for job in jobs if job not in replaced_jobs]
+        if standing_job is not None and standing_job.standing is Standing.PROPOSED:
+            proposed_jobs.append(standing_job)
+        if standing_job is not None and standing_job.published_at is None and submission_id not in hidden_submissions:
+            released_jobs.append(standing_job)
     counts = PublicationCounts(
-        len(released),
-        len(standing),
-        sum(job.state in UNFINISHED for job in left),
-        sum(job.state is JobState.DEAD for job in left),
-        len(hidden),
-        sum(job.id in unjudged and job.published_at is None for job in left),
+        len(released_jobs),
+        len(proposed_jobs),
+        sum(job.state in UNFINISHED for job in remaining_jobs),
+        sum(job.state is JobState.DEAD for job in remaining_jobs),
+        len(hidden_submissions),
+        sum(job.id in unjudged_ids and job.published_at is None for job in remaining_jobs),
     )
-    return _Plan(released, standing, outdated, counts)
+    return _Plan(released_jobs, proposed_jobs, outdated_jobs, counts)
 
 
-def _choose_standing_job(jobs: Sequence[Job], unjudged: Set[str]) -> tuple[Job | None, list[Job]]:
+def _choose_standing_job(jobs: Sequence[Job], unjudged_ids: Set[str]) -> tuple[Job | None, list[Job]]:
     """Return the new standing job of a submission, and the jobs that it replaces.
 
     The newest trusted regrade replaces the standing job, regardless of its age, and every older proposal. Ungraded and
-    ``unjudged`` jobs remain proposals.
+    ``unjudged_ids`` jobs remain proposals.
     """
-    done = [job for job in jobs if current_grades.is_trusted(job) and job.id not in unjudged]
-    proposed = [job for job in done if job.standing is Standing.PROPOSED]
-    if not proposed:
-        return next((job for job in done if job.standing is Standing.STANDS), None), []
-    newest = proposed[-1]
-    return newest, [
+    trusted_jobs = [job for job in jobs if current_grades.is_trusted(job) and job.id not in unjudged_ids]
+    proposed_jobs = [job for job in trusted_jobs if job.standing is Standing.PROPOSED]
+    if not proposed_jobs:
+        return next((job for job in trusted_jobs if job.standing is Standing.STANDS), None), []
+    newest_job = proposed_jobs[-1]
+    return newest_job, [
         job
         for job in jobs
-        if job is not newest and (job.standing is Standing.STANDS or job.queued_at <= newest.queued_at)
+        if job is not newest_job and (job.standing is Standing.STANDS or job.queued_at <= newest_job.queued_at)
     ]
 
 
-def _load_unjudged_jobs(session: Session, ids: Select[int]) -> set[str]:
+def _load_unjudged_jobs(session: Session, submission_ids: Select[int]) -> set[str]:
     """Return the jobs of these submissions with a criterion that was neither judged nor set by staff."""
     query = (
         select(CriterionResultRow.job_id)
         .join(Job, CriterionResultRow.job_id == Job.id)
-        .where(Job.submission_id.in_(ids), overrides.match_unjudged())
+        .where(Job.submission_id.in_(submission_ids), overrides.match_unjudged())
     )
     return set(session.scalars(query))

@@ -28,25 +28,25 @@ _AT_ONCE = 1000
 
 def build_rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
     """Return the rank tables of the graded jobs that are not excused and not staff-only."""
-    graded = [line for line in lines if current_grades.is_for_students(line)]
-    asked: dict[tuple[str, str], Ranking] = {}
-    for content in _load_contents(session, graded):
+    graded_lines = [line for line in lines if current_grades.is_for_students(line)]
+    rankings_by_key: dict[tuple[str, str], Ranking] = {}
+    for content in _load_contents(session, graded_lines):
         # Most assignments rank nothing, and decoding one takes longer than everything else here.
         if b'"ranking"' in zlib.decompress(content):
             from submissions.criteria.timing import Ranking
 
             assignment = assignment_from_bytes(content)
             rankings = (each for each in assignment.criteria if isinstance(each, Ranking))
-            asked |= {(assignment.id, ranking.id): ranking for ranking in rankings}
+            rankings_by_key |= {(assignment.id, ranking.id): ranking for ranking in rankings}
     return [
-        _build_table(session, assignment, ranking, [line for line in graded if line.assignment == assignment])
-        for (assignment, _), ranking in asked.items()
+        _build_table(session, assignment, ranking, [line for line in graded_lines if line.assignment == assignment])
+        for (assignment, _), ranking in rankings_by_key.items()
     ]
 
 
 def _split_lines(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
-    for begin in range(0, len(lines), _AT_ONCE):
-        yield {line.id: line for line in lines[begin : begin + _AT_ONCE]}
+    for start in range(0, len(lines), _AT_ONCE):
+        yield {line.id: line for line in lines[start : start + _AT_ONCE]}
 
 
 def _load_contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:
@@ -68,14 +68,16 @@ def _build_table(session: Session, assignment: str, ranking: Ranking, lines: Seq
                 CriterionResultRow.job_id.in_(jobs), CriterionResultRow.criterion == ranking.id
             )
         )
-        by_hand = overrides.load_overrides(session, list(jobs))
-        for job_id, kept in rows:
-            override = by_hand.get(job_id, {}).get(ranking.id)
+        overrides_by_job = overrides.load_overrides(session, list(jobs))
+        for job_id, encoded_evidence in rows:
+            override = overrides_by_job.get(job_id, {}).get(ranking.id)
             if override is not None and override.marks is None:
                 continue
-            evidence = decode(tuple[Evidence, ...], kept)
-            found = [measure for each in evidence for measure in each.measures if measure.name == ranking.measure]
-            unit = next((measure.unit for measure in found), unit)
-            values = tuple(measure.value for measure in found)
+            evidence = decode(tuple[Evidence, ...], encoded_evidence)
+            matching_measures = [
+                measure for each in evidence for measure in each.measures if measure.name == ranking.measure
+            ]
+            unit = next((measure.unit for measure in matching_measures), unit)
+            values = tuple(measure.value for measure in matching_measures)
             measures.append(StudentMeasures(jobs[job_id].student, values, len(evidence)))
     return RankTable(assignment, ranking.title, ranking.measure, unit, rank_students(measures, highest=ranking.highest))

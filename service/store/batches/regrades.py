@@ -100,121 +100,131 @@ class ChangesPage:
 
 
 def queue_regrades(
-    session: Session, original: Batch, frozen: FrozenAssignment | None, *, max_attempts: int
+    session: Session, original: Batch, frozen_assignment: FrozenAssignment | None, *, max_attempts: int
 ) -> RegradeBatch:
     """Queue a regrade of every submission of the batch that was graded or failed.
 
-    Uses the assignment version ``frozen``, or else the version that each was graded against. Standing grades are not
-    changed. Raises UsageError if there is nothing to grade again.
+    Uses the assignment version ``frozen_assignment``, or else the version that each was graded against. Standing grades
+    are not changed. Raises UsageError if there is nothing to grade again.
     """
-    at = now(session)
-    standing = _load_standing_jobs(session, original.id)
-    ended = [row for row in standing if row[0].state in (JobState.DONE, JobState.DEAD)]
-    wanted = [job for job, name in ended if frozen is None or name == frozen.assignment.id]
-    unfinished = sum(job.state in UNFINISHED for job, _ in standing)
-    if not wanted:
-        raise UsageError(_describe_empty_regrade(original.id, frozen, {name for _, name in standing}, unfinished))
-    version_id = None if frozen is None else store_version(session, frozen, at)
+    current_time = now(session)
+    standing_jobs = _load_standing_jobs(session, original.id)
+    ended_jobs = [row for row in standing_jobs if row[0].state in (JobState.DONE, JobState.DEAD)]
+    selected_jobs = [
+        job for job, name in ended_jobs if frozen_assignment is None or name == frozen_assignment.assignment.id
+    ]
+    unfinished_count = sum(job.state in UNFINISHED for job, _ in standing_jobs)
+    if not selected_jobs:
+        raise UsageError(
+            _describe_empty_regrade(
+                original.id, frozen_assignment, {name for _, name in standing_jobs}, unfinished_count
+            )
+        )
+    version_id = None if frozen_assignment is None else store_version(session, frozen_assignment, current_time)
     batch = Batch(
         course_id=original.course_id,
         name=f"regrade of {original.name}",
         refusals=[],
         regrade_of=original.id,
-        created_at=at,
+        created_at=current_time,
     )
     session.add(batch)
     session.flush()
-    for job in wanted:
-        enqueue(session, _build_proposal(job, version_id, batch.id, JobQueue.BATCH, max_attempts), at)
-    return RegradeBatch(batch.id, len(wanted), len(ended) - len(wanted), unfinished)
+    for job in selected_jobs:
+        enqueue(session, _build_proposal(job, version_id, batch.id, JobQueue.BATCH, max_attempts), current_time)
+    return RegradeBatch(batch.id, len(selected_jobs), len(ended_jobs) - len(selected_jobs), unfinished_count)
 
 
-def queue_regrade(session: Session, asked: Job, frozen: FrozenAssignment | None, *, max_attempts: int) -> Job:
+def queue_regrade(
+    session: Session, requested_job: Job, frozen_assignment: FrozenAssignment | None, *, max_attempts: int
+) -> Job:
     """Queue an interactive regrade of one submission and return the new job.
 
-    ``frozen`` as in ``regrade``. Raises UsageError if there is no grade yet, or for another assignment.
+    ``frozen_assignment`` as in ``regrade``. Raises UsageError if there is no grade yet, or for another assignment.
     """
-    at = now(session)
-    of_submission = (Job.submission_id == asked.submission_id, Job.standing == Standing.STANDS)
-    standing = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id)).all()
-    ended = [job for job in standing if job.state in (JobState.DONE, JobState.DEAD)]
-    if not ended:
+    current_time = now(session)
+    is_standing = (Job.submission_id == requested_job.submission_id, Job.standing == Standing.STANDS)
+    standing_jobs = session.scalars(select(Job).where(*is_standing).order_by(Job.queued_at, Job.id)).all()
+    ended_jobs = [job for job in standing_jobs if job.state in (JobState.DONE, JobState.DEAD)]
+    if not ended_jobs:
         raise UsageError("this submission is not graded yet")
-    name = session.get_one(AssignmentVersion, ended[-1].assignment_version_id).assignment
-    if frozen is not None and frozen.assignment.id != name:
-        raise UsageError(f"this submission is for {name}, not for {frozen.assignment.id}")
-    version_id = None if frozen is None else store_version(session, frozen, at)
-    proposal = _build_proposal(ended[-1], version_id, None, JobQueue.INTERACTIVE, max_attempts)
-    enqueue(session, proposal, at)
+    name = session.get_one(AssignmentVersion, ended_jobs[-1].assignment_version_id).assignment
+    if frozen_assignment is not None and frozen_assignment.assignment.id != name:
+        raise UsageError(f"this submission is for {name}, not for {frozen_assignment.assignment.id}")
+    version_id = None if frozen_assignment is None else store_version(session, frozen_assignment, current_time)
+    proposal = _build_proposal(ended_jobs[-1], version_id, None, JobQueue.INTERACTIVE, max_attempts)
+    enqueue(session, proposal, current_time)
     session.flush()
     return proposal
 
 
 def load_change(session: Session, job_id: str) -> Change | None:
     """Return the change that a regrade makes; None if the job is not a regrade."""
-    after = session.get(Job, job_id)
-    if after is None or after.regrade_of is None:
+    regrade = session.get(Job, job_id)
+    if regrade is None or regrade.regrade_of is None:
         return None
-    student = session.get_one(Enrolment, after.enrolment_id).student
-    return _build_change(session, after, session.get_one(Job, after.regrade_of), student)
+    student = session.get_one(Enrolment, regrade.enrolment_id).student
+    return _build_change(session, regrade, session.get_one(Job, regrade.regrade_of), student)
 
 
 def load_gradings(session: Session, submission_id: int) -> list[GradingLine]:
     """Return all gradings of a submission, oldest first, without those of quarantined workers."""
-    of_submission = (Job.submission_id == submission_id, Job.suspect.is_(None))
-    rows = session.scalars(select(Job).where(*of_submission).order_by(Job.queued_at, Job.id))
+    is_grading = (Job.submission_id == submission_id, Job.suspect.is_(None))
+    rows = session.scalars(select(Job).where(*is_grading).order_by(Job.queued_at, Job.id))
     return [
         GradingLine(row.id, row.state, row.standing, row.marks, row.max_marks, row.queued_at, row.published_at)
         for row in rows
     ]
 
 
-def load_changes(session: Session, batch_id: str, hidden: HiddenNames) -> list[Change]:
+def load_changes(session: Session, batch_id: str, hidden_names: HiddenNames) -> list[Change]:
     """Return the changes of a batch of regrades, ordered by displayed student name."""
-    before = aliased(Job)
+    original_job = aliased(Job)
     query = (
-        select(Job, before, Enrolment.student, SubmissionRow.assignment)
-        .join(before, Job.regrade_of == before.id)
+        select(Job, original_job, Enrolment.student, SubmissionRow.assignment)
+        .join(original_job, Job.regrade_of == original_job.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(Job.batch_id == batch_id)
     )
-    found = [
-        _build_change(session, after, earlier, hidden.label_student(assignment, student))
+    changes = [
+        _build_change(session, after, earlier, hidden_names.label_student(assignment, student))
         for after, earlier, student, assignment in session.execute(query)
     ]
-    return sorted(found, key=lambda each: (each.student, each.job_id))
+    return sorted(changes, key=lambda each: (each.student, each.job_id))
 
 
-def load_changes_page(session: Session, batch_id: str, page: int, hidden: HiddenNames) -> ChangesPage:
+def load_changes_page(session: Session, batch_id: str, page: int, hidden_names: HiddenNames) -> ChangesPage:
     """Return a page of the changes of a batch of regrades: different marks first, then by student.
 
     If names are hidden, the order is that of the random job ids.
     """
-    before = aliased(Job)
-    differ = or_(Job.marks != before.marks, Job.max_marks != before.max_marks, Job.marks.is_(None))
-    of_batch = (Job.batch_id == batch_id, Job.suspect.is_(None))
-    joined = (
-        select(func.count(), func.count(case((differ, 1)))).select_from(Job).join(before, Job.regrade_of == before.id)
+    original_job = aliased(Job)
+    is_different = or_(Job.marks != original_job.marks, Job.max_marks != original_job.max_marks, Job.marks.is_(None))
+    is_in_batch = (Job.batch_id == batch_id, Job.suspect.is_(None))
+    count_query = (
+        select(func.count(), func.count(case((is_different, 1))))
+        .select_from(Job)
+        .join(original_job, Job.regrade_of == original_job.id)
     )
-    found, differing = session.execute(joined.where(*of_batch)).one()
-    page = min(max(page, 1), max(1, -(-found // _CHANGES_A_PAGE)))
-    shown_order = case((SubmissionRow.assignment.in_(hidden.assignments), ""), else_=Enrolment.student)
+    change_count, different_count = session.execute(count_query.where(*is_in_batch)).one()
+    page = min(max(page, 1), max(1, -(-change_count // _CHANGES_A_PAGE)))
+    name_order = case((SubmissionRow.assignment.in_(hidden_names.assignments), ""), else_=Enrolment.student)
     query = (
-        select(Job, before, Enrolment.student, SubmissionRow.assignment)
-        .join(before, Job.regrade_of == before.id)
+        select(Job, original_job, Enrolment.student, SubmissionRow.assignment)
+        .join(original_job, Job.regrade_of == original_job.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-        .where(*of_batch)
-        .order_by(case((differ, 0), else_=1), shown_order, Job.id)
+        .where(*is_in_batch)
+        .order_by(case((is_different, 0), else_=1), name_order, Job.id)
         .limit(_CHANGES_A_PAGE)
         .offset((page - 1) * _CHANGES_A_PAGE)
     )
-    shown = tuple(
-        _build_change(session, after, earlier, hidden.label_student(assignment, student))
+    changes = tuple(
+        _build_change(session, after, earlier, hidden_names.label_student(assignment, student))
         for after, earlier, student, assignment in session.execute(query)
     )
-    return ChangesPage(shown, found, differing, page, max(1, -(-found // _CHANGES_A_PAGE)))
+    return ChangesPage(changes, change_count, different_count, page, max(1, -(-change_count // _CHANGES_A_PAGE)))
 
 
 def _load_standing_jobs(session: Session, batch_id: str) -> Sequence[tuple[Job, str]]:
@@ -228,11 +238,16 @@ def _load_standing_jobs(session: Session, batch_id: str) -> Sequence[tuple[Job, 
     return [(job, name) for job, name in session.execute(query)]
 
 
-def _describe_empty_regrade(batch_id: str, frozen: FrozenAssignment | None, found: set[str], unfinished: int) -> str:
-    if frozen is not None and found and frozen.assignment.id not in found:
-        return f"batch {batch_id} has no submission for {frozen.assignment.id}, only for {', '.join(sorted(found))}"
-    waits = f": {unfinished} of its submissions are not graded yet" if unfinished else ""
-    return f"batch {batch_id} has nothing to grade again{waits}"
+def _describe_empty_regrade(
+    batch_id: str, frozen_assignment: FrozenAssignment | None, assignment_names: set[str], unfinished_count: int
+) -> str:
+    if frozen_assignment is not None and assignment_names and frozen_assignment.assignment.id not in assignment_names:
+        return (
+            f"batch {batch_id} has no submission for {frozen_assignment.assignment.id}, only for "
+            f"{', '.join(sorted(assignment_names))}"
+        )
+    unfinished_note = f": {unfinished_count} of its submissions are not graded yet" if unfinished_count else ""
+    return f"batch {batch_id} has nothing to grade again{unfinished_note}"
 
 
 def _build_proposal(job: Job, version_id: int | None, batch_id: str | None, lane: JobQueue, max_attempts: int) -> Job:
@@ -249,32 +264,34 @@ def _build_proposal(job: Job, version_id: int | None, batch_id: str | None, lane
     )
 
 
-def _build_change(session: Session, after: Job, before: Job, student: str) -> Change:
-    reason = _describe_reason(session, before, after)
+def _build_change(session: Session, regrade: Job, original: Job, student: str) -> Change:
+    reason = _describe_reason(session, original, regrade)
     return Change(
         student=student,
-        job_id=after.id,
-        before_id=before.id,
-        state=after.state,
-        standing=after.standing,
-        before=before.marks,
-        after=after.marks,
-        before_max=before.max_marks,
-        after_max=after.max_marks,
-        criteria=_compare_criteria(session, before.id, after.id) if after.state is JobState.DONE else (),
+        job_id=regrade.id,
+        before_id=original.id,
+        state=regrade.state,
+        standing=regrade.standing,
+        before=original.marks,
+        after=regrade.marks,
+        before_max=original.max_marks,
+        after_max=regrade.max_marks,
+        criteria=_compare_criteria(session, original.id, regrade.id) if regrade.state is JobState.DONE else (),
         reason=reason or _UNEXPLAINED,
         is_unexplained=reason is None,
     )
 
 
-def _compare_criteria(session: Session, before_id: str, after_id: str) -> tuple[CriterionChange, ...]:
-    before, after = _load_marks(session, before_id), _load_marks(session, after_id)
-    changed = []
-    for key, line in {**before, **after}.items():
-        worths = _read_marks(before.get(key)), _read_marks(after.get(key))
-        if worths[0] != worths[1]:
-            changed.append(CriterionChange(line.title, *worths, by_hand=key in after and line.override is not None))
-    return tuple(changed)
+def _compare_criteria(session: Session, original_id: str, regrade_id: str) -> tuple[CriterionChange, ...]:
+    original_marks, regrade_marks = _load_marks(session, original_id), _load_marks(session, regrade_id)
+    criterion_changes = []
+    for key, line in {**original_marks, **regrade_marks}.items():
+        marks_pair = _read_marks(original_marks.get(key)), _read_marks(regrade_marks.get(key))
+        if marks_pair[0] != marks_pair[1]:
+            criterion_changes.append(
+                CriterionChange(line.title, *marks_pair, by_hand=key in regrade_marks and line.override is not None)
+            )
+    return tuple(criterion_changes)
 
 
 def _load_marks(session: Session, job_id: str) -> dict[str, CriterionMarks]:
@@ -285,25 +302,25 @@ def _read_marks(line: CriterionMarks | None) -> tuple[Decimal, Decimal] | None:
     return None if line is None else (line.marks, line.max_marks)
 
 
-def _describe_reason(session: Session, before: Job, after: Job) -> str | None:
+def _describe_reason(session: Session, original: Job, regrade: Job) -> str | None:
     """Return every difference between two gradings that may explain different marks; None without one."""
-    if after.state is not JobState.DONE:
-        return after.error or after.state.value
+    if regrade.state is not JobState.DONE:
+        return regrade.error or regrade.state.value
     reasons = []
-    versions = [session.get_one(AssignmentVersion, job.assignment_version_id) for job in (before, after)]
+    versions = [session.get_one(AssignmentVersion, job.assignment_version_id) for job in (original, regrade)]
     if versions[0].id != versions[1].id and versions[0].version != versions[1].version:
         reasons.append("assignment changed")
-    if before.state is not JobState.DONE:
+    if original.state is not JobState.DONE:
         reasons.append("had no grade")
-    elif before.grader_sha256 is None or before.grader_sha256 != after.grader_sha256:
-        versions_differ = before.grader_version != after.grader_version
-        told = f" ({before.grader_version} to {after.grader_version})" if versions_differ else ""
-        reasons.append(f"grader changed{told}")
-    if before.state is JobState.DONE and before.secret_sha256 != after.secret_sha256:
+    elif original.grader_sha256 is None or original.grader_sha256 != regrade.grader_sha256:
+        versions_differ = original.grader_version != regrade.grader_version
+        version_note = f" ({original.grader_version} to {regrade.grader_version})" if versions_differ else ""
+        reasons.append(f"grader changed{version_note}")
+    if original.state is JobState.DONE and original.secret_sha256 != regrade.secret_sha256:
         reasons.append("secret changed")
-    if before.suspect is not None:
+    if original.suspect is not None:
         reasons.append("the earlier worker was found to grade wrongly")
-    if not reasons and _load_chains(session, before.id) != _load_chains(session, after.id):
+    if not reasons and _load_chains(session, original.id) != _load_chains(session, regrade.id):
         # The same grader and assignment must give the same recordings, so this needs review.
         return None
     return ", ".join(reasons) or "nothing changed"

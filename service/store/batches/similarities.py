@@ -21,15 +21,18 @@ from service.store.grades import current_grades, results
 MOST_AT_ONCE = 300
 
 
-def find_similar_submissions(store: Store, lines: Sequence[JobLine], given: Path | None = None) -> list[Similarity]:
+def find_similar_submissions(
+    store: Store, lines: Sequence[JobLine], given_code: Path | None = None
+) -> list[Similarity]:
     """Return the similar submissions of each assignment of a batch.
 
-    Ignores code given with the assignment and the code in ``given``. Only the recordings of one submission are in
-    memory at a time. Raises UsageError if ``given`` cannot be read.
+    Ignores code given with the assignment and the code in ``given_code``. Only the recordings of one submission are in
+    memory at a time. Raises UsageError if ``given_code`` cannot be read.
     """
     assignments = sorted({line.assignment for line in lines})
     return [
-        _compare_assignment(store, [line for line in lines if line.assignment == each], given) for each in assignments
+        _compare_assignment(store, [line for line in lines if line.assignment == each], given_code)
+        for each in assignments
     ]
 
 
@@ -45,20 +48,20 @@ class SourceTexts:
         """Return the text of one file of a student."""
         if not self._texts:
             with self._store.reading() as session:
-                each = intake.load_each_submission(session, self._jobs.values())
-                self._texts = {job_id: extract_sources(submission) for job_id, submission in each}
+                submissions = intake.load_each_submission(session, self._jobs.values())
+                self._texts = {job_id: extract_sources(submission) for job_id, submission in submissions}
         return self._texts[self._jobs[assignment, student]][file]
 
 
-def _compare_assignment(store: Store, lines: Sequence[JobLine], given: Path | None) -> Similarity:
-    graded = [line.id for line in lines if current_grades.is_trusted(line)]
+def _compare_assignment(store: Store, lines: Sequence[JobLine], given_code: Path | None) -> Similarity:
+    graded_ids = [line.id for line in lines if current_grades.is_trusted(line)]
     with store.reading() as session:
         assignment = intake.load_assignment(session, lines[0].id)
-        left_out = collect_given_code(assignment, given)
+        ignored_code = collect_given_code(assignment, given_code)
         submissions = intake.load_each_submission(session, [line.id for line in lines])
         texts = {job_id: extract_sources(submission) for job_id, submission in submissions}
-        trials = results.load_each_trials(session, graded)
-        behaved = {job_id: extract_behaviour(of_job) for job_id, of_job in trials}
+        trials = results.load_each_trials(session, graded_ids)
+        behaviours_by_job = {job_id: extract_behaviour(of_job) for job_id, of_job in trials}
     sources = [build_source(line.student, file, text) for line in lines for file, text in texts[line.id].items()]
-    behaviours = {line.student: behaved[line.id] for line in lines if line.id in behaved}
-    return compare_submissions(assignment.id, sources, left_out, behaviours)
+    behaviours = {line.student: behaviours_by_job[line.id] for line in lines if line.id in behaviours_by_job}
+    return compare_submissions(assignment.id, sources, ignored_code, behaviours)

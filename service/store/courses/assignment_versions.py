@@ -44,25 +44,25 @@ def freeze_assignment(assignment: Assignment) -> FrozenAssignment:
     return FrozenAssignment(assignment, content, hashlib.sha256(zlib.decompress(content)).hexdigest())
 
 
-def store_version(session: Session, frozen: FrozenAssignment, at: datetime) -> int:
+def store_version(session: Session, frozen_assignment: FrozenAssignment, current_time: datetime) -> int:
     """Return the id of the row with exactly this content, inserting it if necessary."""
-    of_version = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == frozen.sha256)
-    found = session.scalar(of_version)
-    if found is not None:
-        return found
-    assignment = frozen.assignment
+    version_query = select(AssignmentVersion.id).where(AssignmentVersion.sha256 == frozen_assignment.sha256)
+    version_id = session.scalar(version_query)
+    if version_id is not None:
+        return version_id
+    assignment = frozen_assignment.assignment
     insert_if_new(
         session,
         AssignmentVersion,
         assignment=assignment.id,
-        sha256=frozen.sha256,
+        sha256=frozen_assignment.sha256,
         version=assignment.version,
         title=assignment.title,
         max_marks=assignment.max_marks,
-        content=frozen.content,
-        created_at=at,
+        content=frozen_assignment.content,
+        created_at=current_time,
     )
-    return session.scalars(of_version).one()
+    return session.scalars(version_query).one()
 
 
 def check_assignment(session: Session, name: str) -> None:
@@ -70,9 +70,9 @@ def check_assignment(session: Session, name: str) -> None:
 
     An empty name means all assignments and is accepted.
     """
-    known = {"", *list_catalogue_ids(), *session.scalars(select(AssignmentVersion.assignment).distinct())}
-    if name not in known:
-        hint = suggest_name(name, known) or "; robomark assignments list shows the catalogue"
+    known_ids = {"", *list_catalogue_ids(), *session.scalars(select(AssignmentVersion.assignment).distinct())}
+    if name not in known_ids:
+        hint = suggest_name(name, known_ids) or "; robomark assignments list shows the catalogue"
         raise UsageError(f"there is no assignment {name!r}{hint}")
 
 
@@ -95,8 +95,10 @@ def assignment_from_bytes(content: bytes) -> Assignment:
 
 def _rename_old_keys(content: dict[str, Any]) -> dict[str, Any]:
     """Return the stored tables of an assignment with keys renamed to their current names."""
-    kept = {name: _rename_keys(content[name]) for name in ("world", "training") if content.get(name) is not None}
-    return content | kept | {"criteria": [_rename_keys(table) for table in content["criteria"]]}
+    renamed_tables = {
+        name: _rename_keys(content[name]) for name in ("world", "training") if content.get(name) is not None
+    }
+    return content | renamed_tables | {"criteria": [_rename_keys(table) for table in content["criteria"]]}
 
 
 def _rename_keys(table: dict[str, Any]) -> dict[str, Any]:

@@ -33,8 +33,8 @@ class HiddenNames:
         """Return the label of the student with this id; the id itself if names are not hidden."""
         if assignment not in self.assignments:
             return student
-        whose = f"{assignment}\n{student}".encode("utf-8", "surrogatepass")
-        digest = hmac.new(self.key, whose, hashlib.sha256).digest()
+        message = f"{assignment}\n{student}".encode("utf-8", "surrogatepass")
+        digest = hmac.new(self.key, message, hashlib.sha256).digest()
         return f"Participant {base64.b32encode(digest)[:_LABEL_LENGTH].decode('ascii')}"
 
 

@@ -47,28 +47,30 @@ class CourseAssignment:
         return self.opened_at is not None and self.closed_at is None
 
 
-def prepare_assignment(session: Session, course_id: int, frozen: FrozenAssignment) -> CourseAssignment:
+def prepare_assignment(session: Session, course_id: int, frozen_assignment: FrozenAssignment) -> CourseAssignment:
     """Add an assignment to a course without opening it, or replace the version of one with the same id."""
-    at = now(session)
-    version_id = store_version(session, frozen, at)
-    row = _find_row(session, course_id, frozen.assignment.id)
+    current_time = now(session)
+    version_id = store_version(session, frozen_assignment, current_time)
+    row = _find_row(session, course_id, frozen_assignment.assignment.id)
     if row is None:
-        row = OpenAssignment(course_id=course_id, assignment=frozen.assignment.id, assignment_version_id=version_id)
+        row = OpenAssignment(
+            course_id=course_id, assignment=frozen_assignment.assignment.id, assignment_version_id=version_id
+        )
         session.add(row)
     row.assignment_version_id = version_id
     if row.batch_id is not None:
-        session.get_one(Batch, row.batch_id).name = _format_batch_name(frozen.assignment.title)
+        session.get_one(Batch, row.batch_id).name = _format_batch_name(frozen_assignment.assignment.title)
     session.flush()
-    return load_course_assignment(session, course_id, frozen.assignment.id)
+    return load_course_assignment(session, course_id, frozen_assignment.assignment.id)
 
 
 def open_for_students(session: Session, course_id: int, assignment: str) -> None:
     """Show the assignment to students and accept submissions. Raises UsageError if the course does not have it."""
-    row, at = _require_row(session, course_id, assignment), now(session)
-    row.opened_at, row.closed_at = row.opened_at or at, None
+    row, current_time = _require_row(session, course_id, assignment), now(session)
+    row.opened_at, row.closed_at = row.opened_at or current_time, None
     if row.batch_id is None:
         title = session.get_one(AssignmentVersion, row.assignment_version_id).title
-        batch = Batch(course_id=course_id, name=_format_batch_name(title), created_at=at)
+        batch = Batch(course_id=course_id, name=_format_batch_name(title), created_at=current_time)
         session.add(batch)
         session.flush()
         row.batch_id = batch.id
@@ -105,9 +107,9 @@ def remove_assignment(session: Session, course_id: int, assignment: str) -> None
     policies.drop_policy(session, course_id, assignment)
 
 
-def hide_names(session: Session, course_id: int, assignment: str, hidden: bool) -> None:
+def hide_names(session: Session, course_id: int, assignment: str, names_hidden: bool) -> None:
     """Hide or show students' names to instructors. Raises UsageError if the course does not have it."""
-    _require_row(session, course_id, assignment).names_hidden = hidden
+    _require_row(session, course_id, assignment).names_hidden = names_hidden
 
 
 def load_anonymous_assignments(session: Session, course_id: int) -> frozenset[str]:
@@ -151,8 +153,8 @@ def _format_batch_name(title: str) -> str:
 
 
 def _find_row(session: Session, course_id: int, assignment: str) -> OpenAssignment | None:
-    of_this = (OpenAssignment.course_id == course_id, OpenAssignment.assignment == assignment)
-    return session.scalar(select(OpenAssignment).where(*of_this))
+    is_row = (OpenAssignment.course_id == course_id, OpenAssignment.assignment == assignment)
+    return session.scalar(select(OpenAssignment).where(*is_row))
 
 
 def _require_row(session: Session, course_id: int, assignment: str) -> OpenAssignment:

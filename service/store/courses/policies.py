@@ -89,13 +89,13 @@ def load_limits_by_assignment(
 ) -> dict[str, PolicyLimits]:
     """Return ``limits`` for several assignments, with the same number of statements."""
     course_id = select(Enrolment.course_id).where(Enrolment.id == enrolment_id).scalar_subquery()
-    known = _load_known_policies(session, Policy.course_id == course_id, assignments)
-    own = {assignment: policy for (_, assignment), policy in known.items()}
-    of_student = (Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", *assignments)))
-    extensions = session.scalars(select(Extension).where(*of_student)).all()
+    policies = _load_known_policies(session, Policy.course_id == course_id, assignments)
+    policies_by_assignment = {assignment: policy for (_, assignment), policy in policies.items()}
+    is_extension = (Extension.enrolment_id == enrolment_id, Extension.assignment.in_(("", *assignments)))
+    extensions = session.scalars(select(Extension).where(*is_extension)).all()
     return {
         each: _apply_extensions(
-            own.get(each) or own.get("") or PolicyLimits(),
+            policies_by_assignment.get(each) or policies_by_assignment.get("") or PolicyLimits(),
             [extension for extension in extensions if extension.assignment in ("", each)],
         )
         for each in assignments
@@ -120,28 +120,28 @@ def apply_policy(
     session: Session, enrolment_id: int, assignment: str, sha256: str, submitted_at: datetime | None
 ) -> Ruling:
     """Apply the policy to a submission that arrives now. An unknown submission time counts as in time."""
-    allowed = load_limits(session, enrolment_id, assignment)
-    counted = _load_attempt_times(session, enrolment_id, [assignment]).get(assignment, {})
-    earlier = [when for sha, when in counted.items() if sha != sha256]
-    if allowed.attempts is not None and len(earlier) >= allowed.attempts:
-        return Ruling(over=ExceededLimit("attempts", len(earlier) + 1, allowed.attempts))
+    limits = load_limits(session, enrolment_id, assignment)
+    attempt_times = _load_attempt_times(session, enrolment_id, [assignment]).get(assignment, {})
+    earlier_times = [when for sha, when in attempt_times.items() if sha != sha256]
+    if limits.attempts is not None and len(earlier_times) >= limits.attempts:
+        return Ruling(over=ExceededLimit("attempts", len(earlier_times) + 1, limits.attempts))
     if submitted_at is None:
         return Ruling()
-    days_late = allowed.days_late(submitted_at)
-    if days_late > allowed.late_days:
-        return Ruling(days_late, ExceededLimit("date", days_late, allowed.late_days))
-    since = [submitted_at - when for when in earlier if when <= submitted_at]
-    if since and min(since).total_seconds() < allowed.cool_down_seconds:
-        minutes = math.floor(min(since).total_seconds() / 60)
-        asked = math.ceil(allowed.cool_down_seconds / 60)
-        return Ruling(days_late, ExceededLimit("cool-down", minutes, asked))
+    days_late = limits.days_late(submitted_at)
+    if days_late > limits.late_days:
+        return Ruling(days_late, ExceededLimit("date", days_late, limits.late_days))
+    pauses = [submitted_at - when for when in earlier_times if when <= submitted_at]
+    if pauses and min(pauses).total_seconds() < limits.cool_down_seconds:
+        minutes = math.floor(min(pauses).total_seconds() / 60)
+        required_minutes = math.ceil(limits.cool_down_seconds / 60)
+        return Ruling(days_late, ExceededLimit("cool-down", minutes, required_minutes))
     return Ruling(days_late)
 
 
 def count_attempts(session: Session, enrolment_id: int, assignments: Collection[str]) -> dict[str, int]:
     """Return the number of a student's submissions that count as attempts so far, by assignment."""
-    counted = _load_attempt_times(session, enrolment_id, assignments)
-    return {each: len(counted.get(each, {})) for each in assignments}
+    attempt_times = _load_attempt_times(session, enrolment_id, assignments)
+    return {each: len(attempt_times.get(each, {})) for each in assignments}
 
 
 def load_visibilities(session: Session, job_id: str) -> frozenset[str]:
@@ -150,10 +150,10 @@ def load_visibilities(session: Session, job_id: str) -> frozenset[str]:
     ``after_due_date`` opens when no student of the course may submit any more, including extensions and late days. All
     but ``hidden`` open when the grade is published. Raises NoResultFound if the job no longer exists.
     """
-    found = load_visibilities_by_job(session, [job_id])
-    if job_id not in found:
+    visibilities_by_job = load_visibilities_by_job(session, [job_id])
+    if job_id not in visibilities_by_job:
         raise NoResultFound
-    return found[job_id]
+    return visibilities_by_job[job_id]
 
 
 def load_visibilities_by_job(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
@@ -165,25 +165,25 @@ def load_visibilities_by_job(session: Session, job_ids: Collection[str]) -> dict
         .where(Job.id.in_(job_ids))
     )
     rows = session.execute(query).all()
-    closed = _find_closed_assignments(session, {(course_id, assignment) for *_, course_id, assignment in rows})
+    closed_pairs = _find_closed_assignments(session, {(course_id, assignment) for *_, course_id, assignment in rows})
     return {
         job_id: _ALWAYS
         | (_WITH_PUBLICATION if published_at is not None else frozenset())
-        | (_AFTER_DUE_DATE if (course_id, assignment) in closed else frozenset())
+        | (_AFTER_DUE_DATE if (course_id, assignment) in closed_pairs else frozenset())
         for job_id, published_at, course_id, assignment in rows
     }
 
 
-def set_policy(session: Session, course_id: int, assignment: str, allowed: PolicyLimits) -> None:
+def set_policy(session: Session, course_id: int, assignment: str, limits: PolicyLimits) -> None:
     """Set the policy of a course for an assignment. An empty ``assignment`` sets the default of the course.
 
     Without a zone, the current zone of this server is stored, so moving the server does not change the days.
     """
     insert_if_new(session, Policy, course_id=course_id, assignment=assignment)
     row = session.scalars(select(Policy).where(Policy.course_id == course_id, Policy.assignment == assignment)).one()
-    row.due_at, row.late_days = allowed.due_at, allowed.late_days
-    row.attempts, row.cool_down_seconds = allowed.attempts, allowed.cool_down_seconds
-    row.zone = allowed.zone or find_local_zone()
+    row.due_at, row.late_days = limits.due_at, limits.late_days
+    row.attempts, row.cool_down_seconds = limits.attempts, limits.cool_down_seconds
+    row.zone = limits.zone or find_local_zone()
 
 
 def drop_policy(session: Session, course_id: int, assignment: str) -> None:
@@ -202,8 +202,8 @@ def extend_policy(
 ) -> None:
     """Extend the policy for one student; replaces the student's earlier extension for the same assignment."""
     insert_if_new(session, Extension, enrolment_id=enrolment_id, assignment=assignment)
-    same = (Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
-    row = session.scalars(select(Extension).where(*same)).one()
+    is_same = (Extension.enrolment_id == enrolment_id, Extension.assignment == assignment)
+    row = session.scalars(select(Extension).where(*is_same)).one()
     row.due_at, row.more_attempts = due_at, more_attempts
 
 
@@ -233,10 +233,10 @@ def list_extensions(session: Session, course_id: int) -> list[ExtensionLine]:
 
 
 def _load_known_policies(
-    session: Session, of_course: ColumnElement[bool], assignments: Collection[str]
+    session: Session, is_in_course: ColumnElement[bool], assignments: Collection[str]
 ) -> dict[tuple[int, str], PolicyLimits]:
     """Return the policies of some assignments and the defaults, by course and assignment."""
-    rows = session.scalars(select(Policy).where(of_course, Policy.assignment.in_(("", *assignments))))
+    rows = session.scalars(select(Policy).where(is_in_course, Policy.assignment.in_(("", *assignments))))
     return {(row.course_id, row.assignment): _build_limits(row) for row in rows}
 
 
@@ -244,28 +244,32 @@ def _build_limits(row: Policy) -> PolicyLimits:
     return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone)
 
 
-def _find_closed_assignments(session: Session, which: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
+def _find_closed_assignments(session: Session, pairs: Collection[tuple[int, str]]) -> set[tuple[int, str]]:
     """Return the given (course, assignment) pairs to which no student may submit any more."""
-    course_ids, assignments = {course_id for course_id, _ in which}, {assignment for _, assignment in which}
-    known = _load_known_policies(session, Policy.course_id.in_(course_ids), assignments)
-    extended = (
+    course_ids, assignments = {course_id for course_id, _ in pairs}, {assignment for _, assignment in pairs}
+    policies = _load_known_policies(session, Policy.course_id.in_(course_ids), assignments)
+    extension_query = (
         select(Enrolment.course_id, Extension.assignment, func.max(Extension.due_at))
         .join(Enrolment, Extension.enrolment_id == Enrolment.id)
         .where(Enrolment.course_id.in_(course_ids), Extension.assignment.in_(("", *assignments)))
         .group_by(Enrolment.course_id, Extension.assignment)
     )
-    latest = {(course_id, each): due_at for course_id, each, due_at in session.execute(extended) if due_at is not None}
-    at = now(session)
-    closed = set()
-    for course_id, assignment in which:
-        policy = known.get((course_id, assignment)) or known.get((course_id, ""))
+    latest_due_dates = {
+        (course_id, each): due_at for course_id, each, due_at in session.execute(extension_query) if due_at is not None
+    }
+    current_time = now(session)
+    closed_pairs = set()
+    for course_id, assignment in pairs:
+        policy = policies.get((course_id, assignment)) or policies.get((course_id, ""))
         if policy is None or policy.due_at is None:
             continue
-        later = [latest[course_id, each] for each in ("", assignment) if (course_id, each) in latest]
-        closed_at = replace(policy, due_at=max([policy.due_at, *later])).closed_at
-        if closed_at is not None and at > closed_at:
-            closed.add((course_id, assignment))
-    return closed
+        extended_dates = [
+            latest_due_dates[course_id, each] for each in ("", assignment) if (course_id, each) in latest_due_dates
+        ]
+        closed_at = replace(policy, due_at=max([policy.due_at, *extended_dates])).closed_at
+        if closed_at is not None and current_time > closed_at:
+            closed_pairs.add((course_id, assignment))
+    return closed_pairs
 
 
 def _load_attempt_times(
@@ -277,9 +281,9 @@ def _load_attempt_times(
     """
     submission = SubmissionRow
     counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_UNCOUNTED_VERDICTS))
-    came_at = func.coalesce(submission.submitted_at, submission.created_at)
+    submission_moment = func.coalesce(submission.submitted_at, submission.created_at)
     query = (
-        select(submission.assignment, submission.sha256, came_at)
+        select(submission.assignment, submission.sha256, submission_moment)
         .join(Job, Job.submission_id == submission.id)
         .where(
             submission.enrolment_id == enrolment_id,
@@ -289,7 +293,7 @@ def _load_attempt_times(
         )
         .order_by(submission.attempt)
     )
-    found: dict[str, dict[str, datetime]] = {}
-    for assignment, sha256, when in session.execute(query):
-        found.setdefault(assignment, {})[sha256] = when
-    return found
+    times_by_assignment: dict[str, dict[str, datetime]] = {}
+    for assignment, sha256, submission_time in session.execute(query):
+        times_by_assignment.setdefault(assignment, {})[sha256] = submission_time
+    return times_by_assignment

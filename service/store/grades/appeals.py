@@ -41,9 +41,9 @@ class AppealLine:
 
 def can_appeal(session: Session, submission_id: int) -> bool:
     """Return whether the submission has a grade that its student may see."""
-    seen = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    seen = seen.where(SubmissionRow.id == submission_id, *current_grades.CAN_COUNT)
-    return session.scalar(seen) is not None
+    visible_grade = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+    visible_grade = visible_grade.where(SubmissionRow.id == submission_id, *current_grades.CAN_COUNT)
+    return session.scalar(visible_grade) is not None
 
 
 def open_appeal(session: Session, submission_id: int, text: str) -> int:
@@ -60,8 +60,8 @@ def open_appeal(session: Session, submission_id: int, text: str) -> int:
     lock_submissions(session, SubmissionRow.id == submission_id)
     if not can_appeal(session, submission_id):
         raise UsageError("you can appeal after your grade is visible")
-    still_open = select(Appeal.id).where(Appeal.submission_id == submission_id, Appeal.answered_at.is_(None))
-    if session.scalar(still_open) is not None:
+    open_query = select(Appeal.id).where(Appeal.submission_id == submission_id, Appeal.answered_at.is_(None))
+    if session.scalar(open_query) is not None:
         raise UsageError("you already have an open appeal; wait for the answer before you appeal again")
     row = Appeal(submission_id=submission_id, text=text, asked_at=now(session))
     session.add(row)
@@ -92,46 +92,48 @@ def answer_appeal(session: Session, course_id: int, appeal_id: int, text: str, a
 def count_open_appeals(session: Session, course_id: int) -> int:
     """Return the number of open appeals of a course."""
     query = select(func.count()).select_from(Appeal).join(SubmissionRow, Appeal.submission_id == SubmissionRow.id)
-    mine = (Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
-    return session.scalar(query.join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id).where(*mine)) or 0
+    open_in_course = (Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
+    return session.scalar(query.join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id).where(*open_in_course)) or 0
 
 
 def list_open_appeals(
-    session: Session, course_id: int, hidden: HiddenNames, *, limit: int | None = None, after: int | None = None
+    session: Session, course_id: int, hidden_names: HiddenNames, *, limit: int | None = None, last_id: int | None = None
 ) -> list[AppealLine]:
     """Return the open appeals of a course, oldest first.
 
-    ``after`` is the id of the last appeal on the previous page.
+    ``last_id`` is the id of the last appeal on the previous page.
     """
     query = _select_lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_(None))
-    if after is not None:
-        query = query.where(Appeal.id > after)
-    return _hide_names(_load_lines(session, query.order_by(Appeal.id).limit(limit)), hidden)
+    if last_id is not None:
+        query = query.where(Appeal.id > last_id)
+    return _hide_names(_load_lines(session, query.order_by(Appeal.id).limit(limit)), hidden_names)
 
 
 def list_answered_appeals(
     session: Session,
     course_id: int,
-    hidden: HiddenNames,
+    hidden_names: HiddenNames,
     *,
     limit: int | None = None,
-    after: tuple[datetime, int] | None = None,
+    cursor: tuple[datetime, int] | None = None,
 ) -> list[AppealLine]:
     """Return the answered appeals of a course, newest answer first.
 
-    ``after`` is the answer time and id of the last appeal on the previous page.
+    ``cursor`` is the answer time and id of the last appeal on the previous page.
     """
     query = _select_lines().where(Enrolment.course_id == course_id, Appeal.answered_at.is_not(None))
-    if after is not None:
-        at, last = after
-        query = query.where(or_(Appeal.answered_at < at, and_(Appeal.answered_at == at, Appeal.id < last)))
+    if cursor is not None:
+        answered_at, last_id = cursor
+        query = query.where(
+            or_(Appeal.answered_at < answered_at, and_(Appeal.answered_at == answered_at, Appeal.id < last_id))
+        )
     return _hide_names(
-        _load_lines(session, query.order_by(Appeal.answered_at.desc(), Appeal.id.desc()).limit(limit)), hidden
+        _load_lines(session, query.order_by(Appeal.answered_at.desc(), Appeal.id.desc()).limit(limit)), hidden_names
     )
 
 
-def _hide_names(found: list[AppealLine], hidden: HiddenNames) -> list[AppealLine]:
-    return [replace(each, who=hidden.label_student(each.assignment, each.who)) for each in found]
+def _hide_names(appeals: list[AppealLine], hidden_names: HiddenNames) -> list[AppealLine]:
+    return [replace(each, who=hidden_names.label_student(each.assignment, each.who)) for each in appeals]
 
 
 def load_appeals(session: Session, submission_id: int) -> list[AppealLine]:

@@ -42,8 +42,8 @@ def add_comment(session: Session, job_id: str, criterion: str, text: str, actor:
         raise UsageError(
             "the comment has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_COMMENT
         )
-    known = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
-    if criterion and not session.scalar(select(known)):
+    criterion_exists = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
+    if criterion and not session.scalar(select(criterion_exists)):
         raise UsageError(
             "grade %(job)s has no criterion %(criterion)s%(hint)s", job=job_id, criterion=repr(criterion[:80]), hint=""
         )
@@ -83,7 +83,9 @@ def load_comments_by_job(session: Session, job_ids: Collection[str]) -> dict[str
         .where(Job.id.in_(job_ids), Comment.withdrawn_at.is_(None))
         .order_by(Comment.id)
     )
-    found: dict[str, list[CommentLine]] = {}
+    comments_by_job: dict[str, list[CommentLine]] = {}
     for job_id, row in session.execute(query):
-        found.setdefault(job_id, []).append(CommentLine(row.id, row.criterion, row.text, row.actor, row.made_at))
-    return found
+        comments_by_job.setdefault(job_id, []).append(
+            CommentLine(row.id, row.criterion, row.text, row.actor, row.made_at)
+        )
+    return comments_by_job

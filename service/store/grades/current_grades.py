@@ -60,22 +60,22 @@ def can_count(attempt: StandingStatus) -> bool:
     return is_for_students(attempt) and attempt.standing is Standing.STANDS
 
 
-def select_counted_submissions(*which: ColumnElement[bool]) -> Select[int]:
-    """Return a query for the ids of the submissions that count, among those selected by ``which``.
+def select_counted_submissions(*conditions: ColumnElement[bool]) -> Select[int]:
+    """Return a query for the ids of the submissions that count, among those selected by ``conditions``.
 
     Each condition on ``SubmissionRow`` must select all attempts of a student at an assignment, or none.
     """
-    ranked = _select_ranked(*which)
-    return select(ranked.c.id).where(ranked.c.place == 1, ranked.c.counts == 1)
+    rank_table = _select_ranked(*conditions)
+    return select(rank_table.c.id).where(rank_table.c.place == 1, rank_table.c.counts == 1)
 
 
-def select_shown_submissions(*which: ColumnElement[bool]) -> Select[int]:
+def select_shown_submissions(*conditions: ColumnElement[bool]) -> Select[int]:
     """Return a query like ``counting`` with one submission for every student.
 
     If none counts, it is the newest within the limits, otherwise the newest.
     """
-    ranked = _select_ranked(*which)
-    return select(ranked.c.id).where(ranked.c.place == 1)
+    rank_table = _select_ranked(*conditions)
+    return select(rank_table.c.id).where(rank_table.c.place == 1)
 
 
 def match_students_of_batches(batch_ids: Select[str]) -> ColumnElement[bool]:
@@ -87,29 +87,29 @@ def match_students_of_batches(batch_ids: Select[str]) -> ColumnElement[bool]:
 
 def select_newer_attempt() -> ColumnElement[int | None]:
     """Return the newest later attempt of the student of a ``SubmissionRow`` that does not count; None without one."""
-    newer, job = aliased(SubmissionRow), aliased(Job)
+    newer_submission, job = aliased(SubmissionRow), aliased(Job)
     return (
-        select(func.max(newer.attempt))
-        .join(job, and_(job.submission_id == newer.id, job.standing == Standing.STANDS))
+        select(func.max(newer_submission.attempt))
+        .join(job, and_(job.submission_id == newer_submission.id, job.standing == Standing.STANDS))
         .where(
-            newer.enrolment_id == SubmissionRow.enrolment_id,
-            newer.assignment == SubmissionRow.assignment,
-            newer.attempt > SubmissionRow.attempt,
-            or_(newer.staff_only.is_not(None), job.state != JobState.DONE),
+            newer_submission.enrolment_id == SubmissionRow.enrolment_id,
+            newer_submission.assignment == SubmissionRow.assignment,
+            newer_submission.attempt > SubmissionRow.attempt,
+            or_(newer_submission.staff_only.is_not(None), job.state != JobState.DONE),
         )
         .correlate(SubmissionRow)
         .scalar_subquery()
     )
 
 
-def _select_ranked(*which: ColumnElement[bool]) -> Subquery:
+def _select_ranked(*conditions: ColumnElement[bool]) -> Subquery:
     counts = case((and_(*CAN_COUNT), 1), else_=0)
-    best_first = (counts.desc(), SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
+    rank_order = (counts.desc(), SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
     pair = (SubmissionRow.enrolment_id, SubmissionRow.assignment)
-    place = func.row_number().over(partition_by=pair, order_by=best_first).label("place")
+    rank = func.row_number().over(partition_by=pair, order_by=rank_order).label("place")
     return (
-        select(SubmissionRow.id, counts.label("counts"), place)
+        select(SubmissionRow.id, counts.label("counts"), rank)
         .join(Job, and_(Job.submission_id == SubmissionRow.id, Job.standing == Standing.STANDS))
-        .where(*which)
+        .where(*conditions)
         .subquery()
     )

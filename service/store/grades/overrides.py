@@ -71,17 +71,24 @@ def parse_marks(text: str) -> Decimal:
 
 
 def set_marks(
-    session: Session, job_id: str, criterion: str, marks: Decimal, reason: str, actor: str, *, seen: int | None = None
+    session: Session,
+    job_id: str,
+    criterion: str,
+    marks: Decimal,
+    reason: str,
+    actor: str,
+    *,
+    expected_override: int | None = None,
 ) -> None:
     """Override the marks of a criterion of this grade's submission.
 
-    ``seen`` is the id of the override that the caller last read, 0 for none. None skips this check.
+    ``expected_override`` is the id of the override that the caller last read, 0 for none. None skips this check.
 
     Raises:
         UsageError: The grade or criterion is unknown, the marks are out of range, or the reason is missing.
-        MarksChanged: The current override is not the one in ``seen``.
+        MarksChanged: The current override is not the one in ``expected_override``.
     """
-    submission_id, line = _load_criterion(session, job_id, criterion, seen)
+    submission_id, line = _load_criterion(session, job_id, criterion, expected_override)
     if not marks.is_finite() or not _ZERO <= marks <= line.worth or marks != marks.quantize(_FINEST_MARKS):
         raise UsageError(
             "marks for %(title)s are %(marks)s, expected 0 to %(worth)s with at most four decimal places",
@@ -93,31 +100,33 @@ def set_marks(
 
 
 def excuse_criterion(
-    session: Session, job_id: str, criterion: str, reason: str, actor: str, *, seen: int | None = None
+    session: Session, job_id: str, criterion: str, reason: str, actor: str, *, expected_override: int | None = None
 ) -> None:
     """Exclude the marks and the maximum of a criterion from the total. Raises UsageError like ``set_marks``."""
-    submission_id, line = _load_criterion(session, job_id, criterion, seen)
+    submission_id, line = _load_criterion(session, job_id, criterion, expected_override)
     _replace_override(session, submission_id, line, None, reason, actor)
 
 
-def withdraw_override(session: Session, job_id: str, criterion: str, actor: str, *, seen: int | None = None) -> None:
+def withdraw_override(
+    session: Session, job_id: str, criterion: str, actor: str, *, expected_override: int | None = None
+) -> None:
     """Restore the grader's marks of a criterion.
 
-    Raises UsageError without an override, MarksChanged if the override is not the one in ``seen``.
+    Raises UsageError without an override, MarksChanged if the override is not the one in ``expected_override``.
     """
     submission_id = _lock_submission(session, job_id)
-    before = load_overrides(session, [job_id]).get(job_id, {}).get(criterion)
-    if before is None:
+    override = load_overrides(session, [job_id]).get(job_id, {}).get(criterion)
+    if override is None:
         raise UsageError(
             "the marks of %(criterion)s in grade %(job)s are not adjusted", criterion=repr(criterion), job=job_id
         )
-    _check_seen(before, seen, criterion)
-    _end_override(session, before, now(session))
+    _check_seen(override, expected_override, criterion)
+    _end_override(session, override, now(session))
     detail = {
         "criterion": criterion,
-        "before": _format_marks(before.marks),
+        "before": _format_marks(override.marks),
         "after": "as graded",
-        "override": before.id,
+        "override": override.id,
     }
     audit.record_action(session, actor, "withdraw", "submission", str(submission_id), **detail)
     _recount_all(session, submission_id)
@@ -130,51 +139,55 @@ def load_overrides(session: Session, job_ids: Collection[str]) -> Mapping[str, M
         .join(Override, Override.submission_id == Job.submission_id)
         .where(Job.id.in_(job_ids), Override.withdrawn_at.is_(None))
     )
-    found: dict[str, dict[str, OverrideLine]] = {}
+    overrides_by_job: dict[str, dict[str, OverrideLine]] = {}
     for job_id, row in session.execute(query):
         line = OverrideLine(row.id, row.marks, row.reason, row.actor, row.made_at)
-        found.setdefault(job_id, {})[row.criterion] = line
-    return found
+        overrides_by_job.setdefault(job_id, {})[row.criterion] = line
+    return overrides_by_job
 
 
 def load_criterion_marks(session: Session, job_id: str) -> list[CriterionMarks]:
     """Return the criteria of a grade in their order."""
     row = CriterionResultRow
     columns = (row.criterion, row.title, row.message, row.visibility, row.unjudged, row.marks, row.max_marks)
-    by_hand = load_overrides(session, [job_id]).get(job_id, {})
+    overrides_by_criterion = load_overrides(session, [job_id]).get(job_id, {})
     lines = []
     for criterion, title, message, visibility, unjudged, marks, worth in session.execute(
         select(*columns).where(row.job_id == job_id).order_by(row.position)
     ):
-        override = by_hand.get(criterion)
-        counted = (marks, worth) if override is None else override.compute_marks(worth)
-        graded = None if unjudged else marks
-        lines.append(CriterionMarks(criterion, title, message, visibility, graded, worth, *counted, override))
+        override = overrides_by_criterion.get(criterion)
+        effective_marks = (marks, worth) if override is None else override.compute_marks(worth)
+        graded_marks = None if unjudged else marks
+        lines.append(
+            CriterionMarks(criterion, title, message, visibility, graded_marks, worth, *effective_marks, override)
+        )
     return lines
 
 
 def recount_marks(session: Session, job_id: str) -> None:
     """Store the effective total of a job's criteria; no other function writes a job's marks."""
     lines = load_criterion_marks(session, job_id)
-    marks, most = (sum(each, _ZERO) for each in ([line.marks for line in lines], [line.max_marks for line in lines]))
-    statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=most)
+    marks, max_marks = (
+        sum(each, _ZERO) for each in ([line.marks for line in lines], [line.max_marks for line in lines])
+    )
+    statement = update(Job).where(Job.id == job_id).values(marks=marks, max_marks=max_marks)
     session.execute(statement, execution_options={"synchronize_session": False})
 
 
 def match_excused() -> ColumnElement[bool]:
     """Return the condition that a criterion row, joined with its job, is excused."""
-    said = exists().where(
+    excusing_override = exists().where(
         Override.submission_id == Job.submission_id,
         Override.criterion == CriterionResultRow.criterion,
         Override.withdrawn_at.is_(None),
         Override.excused,
     )
-    return said.correlate(Job, CriterionResultRow)
+    return excusing_override.correlate(Job, CriterionResultRow)
 
 
 def match_unjudged() -> ColumnElement[bool]:
     """Return the condition that a criterion row, joined with its job, is unjudged and has no override."""
-    said = (
+    active_override = (
         exists()
         .where(
             Override.submission_id == Job.submission_id,
@@ -183,7 +196,7 @@ def match_unjudged() -> ColumnElement[bool]:
         )
         .correlate(Job, CriterionResultRow)
     )
-    return and_(CriterionResultRow.unjudged.is_not(None), ~said)
+    return and_(CriterionResultRow.unjudged.is_not(None), ~active_override)
 
 
 def _lock_submission(session: Session, job_id: str) -> int:
@@ -195,7 +208,9 @@ def _lock_submission(session: Session, job_id: str) -> int:
     return job.submission_id
 
 
-def _load_criterion(session: Session, job_id: str, criterion: str, seen: int | None) -> tuple[int, CriterionMarks]:
+def _load_criterion(
+    session: Session, job_id: str, criterion: str, expected_override: int | None
+) -> tuple[int, CriterionMarks]:
     submission_id = _lock_submission(session, job_id)
     lines = {line.criterion: line for line in load_criterion_marks(session, job_id)}
     if criterion not in lines:
@@ -206,13 +221,16 @@ def _load_criterion(session: Session, job_id: str, criterion: str, seen: int | N
             hint=suggest_name(criterion, lines),
         )
     line = lines[criterion]
-    _check_seen(line.override, seen, line.title)
+    _check_seen(line.override, expected_override, line.title)
     return submission_id, line
 
 
-def _check_seen(override: OverrideLine | None, seen: int | None, title: str) -> None:
-    """Compare ``seen`` under the lock of the grade, so that the second of two concurrent changes is rejected."""
-    if seen is not None and seen != (0 if override is None else override.id):
+def _check_seen(override: OverrideLine | None, expected_override: int | None, title: str) -> None:
+    """Compare ``expected_override`` under the lock of the grade.
+
+    The second of two concurrent changes is rejected.
+    """
+    if expected_override is not None and expected_override != (0 if override is None else override.id):
         raise MarksChanged(
             "Another person changed the marks of %(title)s. Check the marks, then repeat your change.", title=title
         )
@@ -228,9 +246,9 @@ def _replace_override(
             count=len(reason),
             most=LONGEST_REASON,
         )
-    at = now(session)
+    current_time = now(session)
     if line.override is not None:
-        _end_override(session, line.override, at)
+        _end_override(session, line.override, current_time)
     row = Override(
         submission_id=submission_id,
         criterion=line.criterion,
@@ -238,27 +256,27 @@ def _replace_override(
         excused=marks is None,
         reason=reason,
         actor=actor,
-        made_at=at,
+        made_at=current_time,
     )
     session.add(row)
     session.flush()
-    before = line.graded if line.override is None else line.override.marks
-    told = "not judged" if line.override is None and line.graded is None else _format_marks(before)
+    previous_value = line.graded if line.override is None else line.override.marks
+    previous_marks = "not judged" if line.override is None and line.graded is None else _format_marks(previous_value)
     # Purging removes the reason with the submission, but not the log entry.
-    detail = {"criterion": line.criterion, "before": told, "after": _format_marks(marks), "override": row.id}
+    detail = {"criterion": line.criterion, "before": previous_marks, "after": _format_marks(marks), "override": row.id}
     action = "excuse" if marks is None else "set marks"
     audit.record_action(session, actor, action, "submission", str(submission_id), **detail)
     _recount_all(session, submission_id)
 
 
-def _end_override(session: Session, line: OverrideLine, at: datetime) -> None:
-    session.get_one(Override, line.id).withdrawn_at = at
+def _end_override(session: Session, line: OverrideLine, current_time: datetime) -> None:
+    session.get_one(Override, line.id).withdrawn_at = current_time
     session.flush()
 
 
 def _recount_all(session: Session, submission_id: int) -> None:
-    done = select(Job.id).where(Job.submission_id == submission_id, Job.state == JobState.DONE)
-    for job_id in session.scalars(done).all():
+    graded_jobs = select(Job.id).where(Job.submission_id == submission_id, Job.state == JobState.DONE)
+    for job_id in session.scalars(graded_jobs).all():
         recount_marks(session, job_id)
 
 

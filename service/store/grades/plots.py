@@ -31,30 +31,36 @@ def claim_plots(store: Store, lease_seconds: float) -> str | None:
     with store.transaction() as session:
         if needs_newer_code(session):
             return None
-        at = now(session)
-        due = (Job.plots == PlotState.DUE, Job.plots_due_at <= at)
-        tried = (*due, Job.plots_attempt >= MOST_ATTEMPTS)
-        session.execute(update(Job).where(match_and_lock_jobs(*tried), *tried).values(plots=PlotState.FAILED))
-        query = select(Job.id).where(*due).order_by(Job.finished_at, Job.id).limit(1)
+        current_time = now(session)
+        is_due = (Job.plots == PlotState.DUE, Job.plots_due_at <= current_time)
+        exhausted_attempts = (*is_due, Job.plots_attempt >= MOST_ATTEMPTS)
+        session.execute(
+            update(Job)
+            .where(match_and_lock_jobs(*exhausted_attempts), *exhausted_attempts)
+            .values(plots=PlotState.FAILED)
+        )
+        query = select(Job.id).where(*is_due).order_by(Job.finished_at, Job.id).limit(1)
         job_id = session.scalar(query.with_for_update(skip_locked=True, key_share=True))
         if job_id is not None:
-            until = at + timedelta(seconds=lease_seconds)
-            put_off = update(Job).where(Job.id == job_id)
-            session.execute(put_off.values(plots_due_at=until, plots_attempt=Job.plots_attempt + 1))
+            lease_end = current_time + timedelta(seconds=lease_seconds)
+            postpone_statement = update(Job).where(Job.id == job_id)
+            session.execute(postpone_statement.values(plots_due_at=lease_end, plots_attempt=Job.plots_attempt + 1))
         return job_id
 
 
 @retry_conflicts
-def store_plots(store: Store, job_id: str, drawn: Mapping[str, bytes]) -> None:
+def store_plots(store: Store, job_id: str, plots: Mapping[str, bytes]) -> None:
     """Store the plots of a job, a mapping of name to PNG."""
-    files = [artifacts.File(f"{_PREFIX}{name}{_SUFFIX}", "image/png", data) for name, data in drawn.items()]
+    files = [artifacts.File(f"{_PREFIX}{name}{_SUFFIX}", "image/png", data) for name, data in plots.items()]
     with store.transaction() as session:
-        at = now(session)
-        artifacts.store_files(session, job_id, files, at)
-        before = session.scalars(select(Job.phases).where(Job.id == job_id)).one()
-        reached = {**before, **phases.encode_times({phases.PLOTTED: at})}
-        done = update(Job).where(Job.id == job_id)
-        session.execute(done.values(plots=PlotState.DONE, plots_due_at=None, plotted_at=at, phases=reached))
+        current_time = now(session)
+        artifacts.store_files(session, job_id, files, current_time)
+        earlier_phases = session.scalars(select(Job.phases).where(Job.id == job_id)).one()
+        phase_times = {**earlier_phases, **phases.encode_times({phases.PLOTTED: current_time})}
+        statement = update(Job).where(Job.id == job_id)
+        session.execute(
+            statement.values(plots=PlotState.DONE, plots_due_at=None, plotted_at=current_time, phases=phase_times)
+        )
 
 
 def load_plots(session: Session, job_id: str) -> dict[str, bytes]:
@@ -70,20 +76,20 @@ def load_each_plots(session: Session, job_ids: Collection[str]) -> Iterator[tupl
     )
 
 
-def _strip_file_names(kept: Mapping[str, artifacts.File]) -> dict[str, bytes]:
-    return {name.removeprefix(_PREFIX).removesuffix(_SUFFIX): file.data for name, file in kept.items()}
+def _strip_file_names(files: Mapping[str, artifacts.File]) -> dict[str, bytes]:
+    return {name.removeprefix(_PREFIX).removesuffix(_SUFFIX): file.data for name, file in files.items()}
 
 
 def count_due_plots(store: Store) -> int:
     """Return the number of jobs whose plots are due."""
     with store.reading() as session:
-        waiting = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
-        return session.scalar(select(func.count()).select_from(Job).where(*waiting)) or 0
+        is_due = (Job.plots == PlotState.DUE, Job.plots_due_at <= now(session))
+        return session.scalar(select(func.count()).select_from(Job).where(*is_due)) or 0
 
 
-def correct_due_times(session: Session, at: datetime, ahead: datetime) -> None:
-    """Make plots due ``at`` if a wrong clock scheduled them after ``ahead``."""
-    waiting = (Job.plots == PlotState.DUE, Job.plots_due_at > ahead)
-    written_later = or_(Job.finished_at > ahead, Job.started_at > ahead)
-    which = (*waiting, written_later)
-    session.execute(update(Job).where(match_and_lock_jobs(*which), *which).values(plots_due_at=at))
+def correct_due_times(session: Session, current_time: datetime, latest_time: datetime) -> None:
+    """Make plots due ``current_time`` if a wrong clock scheduled them after ``latest_time``."""
+    scheduled_later = (Job.plots == PlotState.DUE, Job.plots_due_at > latest_time)
+    is_written_later = or_(Job.finished_at > latest_time, Job.started_at > latest_time)
+    conditions = (*scheduled_later, is_written_later)
+    session.execute(update(Job).where(match_and_lock_jobs(*conditions), *conditions).values(plots_due_at=current_time))

@@ -41,19 +41,19 @@ def compute_size_limit(trials: int) -> int:
     return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
 
 
-def encode_within_limit(recording: Recording, cap: int) -> StoredRecording:
-    """Encode a recording within ``cap`` bytes; parts that do not fit are left out, with a note.
+def encode_within_limit(recording: Recording, size_limit: int) -> StoredRecording:
+    """Encode a recording within ``size_limit`` bytes; parts that do not fit are left out, with a note.
 
     Removed first are images and all but the first texts of each kind, then all texts, then the ticks. The verdict,
     faults, poses and chain hash are always kept.
     """
     data = to_bytes(recording)
-    for trim in (_drop_floods, _drop_texts, _drop_ticks):
-        if len(data) <= cap:
+    for trim_recording in (_drop_floods, _drop_texts, _drop_ticks):
+        if len(data) <= size_limit:
             break
         if recording.partner is not None:
-            recording = replace(recording, partner=trim(recording.partner))
-        recording = trim(recording)
+            recording = replace(recording, partner=trim_recording(recording.partner))
+        recording = trim_recording(recording)
         data = to_bytes(recording)
     return StoredRecording(recording, data)
 
@@ -61,15 +61,15 @@ def encode_within_limit(recording: Recording, cap: int) -> StoredRecording:
 def to_bytes(recording: Recording) -> bytes:
     """Return the whole recording, compressed."""
     ticks = recording.ticks
-    words: dict[str, Any] = {
+    metadata: dict[str, Any] = {
         field.name: encode(getattr(recording, field.name))
         for field in fields(recording)
         if field.name not in ("ticks", "images", "partner", "places")
     }
-    words["ticks"] = _encode_tick_totals(ticks)
-    words["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
+    metadata["ticks"] = _encode_tick_totals(ticks)
+    metadata["images"] = [encode(replace(image, left=b"", right=b"")) for image in recording.images]
     arrays: dict[str, NDArray[Any]] = {
-        "words": _to_byte_array(json.dumps(words, separators=(",", ":")).encode("ascii")),
+        "words": _to_byte_array(json.dumps(metadata, separators=(",", ":")).encode("ascii")),
         "picture_sizes": np.array([[len(i.left), len(i.right)] for i in recording.images], np.int64),
         "pictures": _to_byte_array(b"".join(i.left + i.right for i in recording.images)),
     }
@@ -87,15 +87,15 @@ def from_bytes(data: bytes) -> Recording:
     """Decode a recording. Raises RecordingError if the bytes are not one."""
     try:
         with np.load(io.BytesIO(zlib.decompress(data)), allow_pickle=False) as arrays:
-            words = json.loads(bytes(arrays["words"]))
+            metadata = json.loads(bytes(arrays["words"]))
             pixels = bytes(arrays["pictures"])
             partner = from_bytes(bytes(arrays["partner"])) if "partner" in arrays else None
             sizes = arrays["picture_sizes"].reshape(-1, 2).tolist()
             # The recording may be older than a column.
             columns = {each.name: _decode_column(arrays[each.name], each) for each in COLUMNS if each.name in arrays}
-        ticks = Ticks(**cast(dict[str, Any], columns), **words.pop("ticks"))
-        images = _restore_pixels(words.pop("images"), sizes, pixels)
-        return build_recording(words, ticks, images, partner)
+        ticks = Ticks(**cast(dict[str, Any], columns), **metadata.pop("ticks"))
+        images = _restore_pixels(metadata.pop("images"), sizes, pixels)
+        return build_recording(metadata, ticks, images, partner)
     except (ValueError, KeyError, TypeError, zlib.error, OSError) as error:
         raise RecordingError(f"not a recording: {error}") from error
 
@@ -105,14 +105,14 @@ def _encode_tick_totals(ticks: Ticks) -> dict[str, int]:
 
 
 def _restore_pixels(images: list[Any], sizes: list[list[int]], pixels: bytes) -> tuple[Image, ...]:
-    made = []
+    restored_images = []
     offset = 0
-    for words, (left, right) in zip(images, sizes, strict=True):
-        middle, end = offset + left, offset + left + right
-        image = decode(Image, words)
-        made.append(replace(image, left=pixels[offset:middle], right=pixels[middle:end]))
-        offset = end
-    return tuple(made)
+    for image_values, (left_size, right_size) in zip(images, sizes, strict=True):
+        split_offset, end_offset = offset + left_size, offset + left_size + right_size
+        image = decode(Image, image_values)
+        restored_images.append(replace(image, left=pixels[offset:split_offset], right=pixels[split_offset:end_offset]))
+        offset = end_offset
+    return tuple(restored_images)
 
 
 def _to_byte_array(data: bytes) -> _Bytes:
@@ -141,8 +141,8 @@ def _decode_column(data: _Bytes, column: Column) -> NDArray[Any]:
     return (values if column.width > 1 else values[:, 0]).copy()
 
 
-def _add_note(recording: Recording, what: str) -> Recording:
-    note = f"The recording was too large to be kept whole: {what}."
+def _add_note(recording: Recording, omission: str) -> Recording:
+    note = f"The recording was too large to be kept whole: {omission}."
     return replace(recording, notes=(*recording.notes, note))
 
 
@@ -163,19 +163,19 @@ def _drop_floods(recording: Recording) -> Recording:
 
 
 def _drop_texts(recording: Recording) -> Recording:
-    bare = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
+    emptied = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
     outputs = (
         replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
     )
-    cut = replace(
-        bare,
+    shortened = replace(
+        emptied,
         responder_output=recording.responder_output[:_TEXT_KEPT],
         responder_log=recording.responder_log[:_TEXT_KEPT],
         faults=recording.faults[:10],
         agent_messages=(),
         agent_outputs=tuple(outputs),
     )
-    return _add_note(cut, "what was printed, said and sent is left out")
+    return _add_note(shortened, "what was printed, said and sent is left out")
 
 
 def _drop_ticks(recording: Recording) -> Recording:

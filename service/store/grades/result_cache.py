@@ -44,9 +44,11 @@ def find_cached_grade(session: Session, key: str) -> str | None:
     Never returns a grade made without the sandbox or by a quarantined worker, cut short by a limit of the machine, or
     with unjudged criteria.
     """
-    distrusted = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
-    cut = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
-    unjudged = exists().where(CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None))
+    has_quarantined_worker = exists().where(Worker.name == Job.worker, Worker.quarantined_at.is_not(None))
+    has_cut_trial = exists().where(TrialRow.job_id == Job.id, TrialRow.verdict.in_(_NOT_REPEATABLE))
+    has_unjudged_criterion = exists().where(
+        CriterionResultRow.job_id == Job.id, CriterionResultRow.unjudged.is_not(None)
+    )
     query = (
         select(Job.id)
         .where(
@@ -56,9 +58,9 @@ def find_cached_grade(session: Session, key: str) -> str | None:
             # The key includes the sandbox policy; these conditions require both layers to be active.
             Job.sandbox.contains("Landlock"),
             Job.sandbox.contains("seccomp"),
-            ~distrusted,
-            ~cut,
-            ~unjudged,
+            ~has_quarantined_worker,
+            ~has_cut_trial,
+            ~has_unjudged_criterion,
         )
         .order_by(Job.finished_at.desc(), Job.id)
         .limit(1)
@@ -70,26 +72,26 @@ def copy_rows(session: Session, source_id: str, job_id: str) -> None:
     """Copy the rows of a grade to another job that has none."""
     for table in (TrialRow, CriterionResultRow, Artifact):
         columns = table.__table__.columns
-        kept = [column for column in columns if column.name not in ("id", "job_id")]
-        rows = select(literal(job_id), *kept).where(columns["job_id"] == source_id)
-        session.execute(insert(table).from_select(["job_id", *(column.name for column in kept)], rows))
+        copied_columns = [column for column in columns if column.name not in ("id", "job_id")]
+        rows = select(literal(job_id), *copied_columns).where(columns["job_id"] == source_id)
+        session.execute(insert(table).from_select(["job_id", *(column.name for column in copied_columns)], rows))
 
 
-def build_copied_values(session: Session, source_id: str, job_id: str, at: datetime) -> dict[str, Any]:
+def build_copied_values(session: Session, source_id: str, job_id: str, current_time: datetime) -> dict[str, Any]:
     """Return the column values that a job takes over from a copied grade."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    of_grade = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
-    names = (*of_grade, "grader_sha256", "secret_sha256", "cache_key")
-    drawn = source.plots is PlotState.DONE
+    grade_columns = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
+    names = (*grade_columns, "grader_sha256", "secret_sha256", "cache_key")
+    has_plots = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {
         "notes": _merge_notes(session, source, job_id),
         "copied_from": source_id,
-        "graded_at": at,
-        "phases": phases.encode_times({phases.QUEUED: queued_at, phases.COMMITTED: at}),
-        "plots": PlotState.DONE if drawn else PlotState.DUE,
-        "plots_due_at": None if drawn else at,
-        "plotted_at": at if drawn else None,
+        "graded_at": current_time,
+        "phases": phases.encode_times({phases.QUEUED: queued_at, phases.COMMITTED: current_time}),
+        "plots": PlotState.DONE if has_plots else PlotState.DUE,
+        "plots_due_at": None if has_plots else current_time,
+        "plotted_at": current_time if has_plots else None,
     }
 
 
@@ -100,8 +102,9 @@ def _merge_notes(session: Session, source: Job, job_id: str) -> list[str]:
     """
     from submissions.stored_submission import unpack_submission
 
-    packed = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
-    theirs, own = (
-        unpack_submission(session.scalars(packed.where(Job.id == each)).one()).notes for each in (source.id, job_id)
+    packed_query = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
+    source_notes, own_notes = (
+        unpack_submission(session.scalars(packed_query.where(Job.id == each)).one()).notes
+        for each in (source.id, job_id)
     )
-    return [*own, *(note for note in source.notes if note not in theirs)]
+    return [*own_notes, *(note for note in source.notes if note not in source_notes)]

@@ -56,34 +56,35 @@ def prepare_grade(grade: Grade) -> PreparedGrade:
     """Compress the recordings and replace the images in predictions by references."""
     from service.store.grades import recordings
 
-    cap = recordings.compute_size_limit(len(grade.trials))
-    kept = [recordings.encode_within_limit(trial.recording, cap) for trial in grade.trials]
+    size_limit = recordings.compute_size_limit(len(grade.trials))
+    encoded_recordings = [recordings.encode_within_limit(trial.recording, size_limit) for trial in grade.trials]
     files = [
-        artifacts.File(_format_recording_name(position), _RECORDING, item.data) for position, item in enumerate(kept)
+        artifacts.File(_format_recording_name(position), _RECORDING, item.data)
+        for position, item in enumerate(encoded_recordings)
     ]
-    numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in kept]
+    numbers = [{image: number for number, image in enumerate(item.recording.images)} for item in encoded_recordings]
     predictions = [
         [
-            plain
+            encoded_prediction
             for prediction in result.predictions
-            if (plain := _encode_prediction(prediction, numbers[prediction.trial])) is not None
+            if (encoded_prediction := _encode_prediction(prediction, numbers[prediction.trial])) is not None
         ]
         for result in grade.criteria
     ]
     return PreparedGrade(grade, files, predictions)
 
 
-def insert_grade(session: Session, job_id: str, prepared: PreparedGrade, at: datetime) -> None:
+def insert_grade(session: Session, job_id: str, prepared_grade: PreparedGrade, current_time: datetime) -> None:
     """Insert the rows of a grade, replacing those of an earlier grading of the same job."""
-    grade = prepared.grade
+    grade = prepared_grade.grade
     session.execute(delete(TrialRow).where(TrialRow.job_id == job_id))
     session.execute(delete(CriterionResultRow).where(CriterionResultRow.job_id == job_id))
     session.add_all(_build_trial_row(job_id, position, trial) for position, trial in enumerate(grade.trials))
     session.add_all(
-        _build_criterion_row(job_id, position, result, prepared.predictions[position])
+        _build_criterion_row(job_id, position, result, prepared_grade.predictions[position])
         for position, result in enumerate(grade.criteria)
     )
-    artifacts.store_files(session, job_id, prepared.files, at)
+    artifacts.store_files(session, job_id, prepared_grade.files, current_time)
 
 
 def load_grade(session: Session, job_id: str) -> Grade:
@@ -120,11 +121,11 @@ def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
 
     Reads no recordings. Jobs without a grade are left out.
     """
-    heads = _load_heads(session, job_ids, defer(CriterionResultRow.predictions))
-    by_hand = overrides.load_overrides(session, job_ids)
+    grades_by_job = _load_heads(session, job_ids, defer(CriterionResultRow.predictions))
+    overrides_by_job = overrides.load_overrides(session, job_ids)
     return {
-        job_id: _apply_overrides(_add_criteria(grade, rows, ()), by_hand.get(job_id, {}))
-        for job_id, (grade, rows) in heads.items()
+        job_id: _apply_overrides(_add_criteria(grade, rows, ()), overrides_by_job.get(job_id, {}))
+        for job_id, (grade, rows) in grades_by_job.items()
     }
 
 
@@ -138,29 +139,35 @@ def load_each_trials(session: Session, job_ids: Collection[str]) -> Iterator[tup
 _LoadedGrades = Iterator[tuple[str, Grade]]
 
 
-def _require_grade(found: _LoadedGrades, job_id: str) -> Grade:
-    for _, grade in found:
+def _require_grade(loaded_grades: _LoadedGrades, job_id: str) -> Grade:
+    for _, grade in loaded_grades:
         return grade
     raise UsageError(f"{job_id} has no grade")
 
 
-def _apply_staff_changes(session: Session, job_ids: Collection[str], graded: _LoadedGrades) -> _LoadedGrades:
-    by_hand, said = overrides.load_overrides(session, job_ids), comments.load_comments_by_job(session, job_ids)
-    for job_id, grade in graded:
-        written = tuple(WrittenComment(each.criterion, each.text) for each in said.get(job_id, ()))
-        yield job_id, replace(_apply_overrides(grade, by_hand.get(job_id, {})), comments=written)
+def _apply_staff_changes(session: Session, job_ids: Collection[str], loaded_grades: _LoadedGrades) -> _LoadedGrades:
+    overrides_by_job, comments_by_job = (
+        overrides.load_overrides(session, job_ids),
+        comments.load_comments_by_job(session, job_ids),
+    )
+    for job_id, grade in loaded_grades:
+        written_comments = tuple(WrittenComment(each.criterion, each.text) for each in comments_by_job.get(job_id, ()))
+        yield job_id, replace(_apply_overrides(grade, overrides_by_job.get(job_id, {})), comments=written_comments)
 
 
-def _apply_overrides(grade: Grade, by_hand: Mapping[str, OverrideLine]) -> Grade:
-    return replace(grade, criteria=tuple(_apply_override(result, by_hand.get(result.id)) for result in grade.criteria))
+def _apply_overrides(grade: Grade, overrides_by_criterion: Mapping[str, OverrideLine]) -> Grade:
+    return replace(
+        grade,
+        criteria=tuple(_apply_override(result, overrides_by_criterion.get(result.id)) for result in grade.criteria),
+    )
 
 
 def _load_original_grades(
-    session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]
+    session: Session, job_ids: Collection[str], decode_recording: Callable[[bytes], Recording]
 ) -> _LoadedGrades:
-    heads = _load_heads(session, job_ids)
-    for job_id, trials in _load_trials(session, heads, read):
-        yield job_id, _add_criteria(*heads[job_id], trials)
+    grades_by_job = _load_heads(session, job_ids)
+    for job_id, trials in _load_trials(session, grades_by_job, decode_recording):
+        yield job_id, _add_criteria(*grades_by_job[job_id], trials)
 
 
 def _add_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tuple[TrialResult, ...]) -> Grade:
@@ -178,14 +185,14 @@ def _load_heads(
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id.in_(job_ids), Job.verdict.is_not(None))
     )
-    heads = {
+    grades_by_job = {
         job.id: (_build_head(job, sha256, student, version), list[CriterionResultRow]())
         for job, sha256, student, version in session.execute(query)
     }
-    rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(heads)).options(*options)
+    rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(grades_by_job)).options(*options)
     for row in session.scalars(rows.order_by(CriterionResultRow.job_id, CriterionResultRow.position)):
-        heads[row.job_id][1].append(row)
-    return heads
+        grades_by_job[row.job_id][1].append(row)
+    return grades_by_job
 
 
 def _build_head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Grade:
@@ -208,7 +215,7 @@ def _build_head(job: Job, sha256: str, student: str, version: AssignmentVersion)
 
 
 def _load_trials(
-    session: Session, job_ids: Collection[str], read: Callable[[bytes], Recording]
+    session: Session, job_ids: Collection[str], decode_recording: Callable[[bytes], Recording]
 ) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
     query = select(TrialRow).where(TrialRow.job_id.in_(job_ids)).order_by(TrialRow.job_id, TrialRow.position)
     rows: dict[str, list[TrialRow]] = {}
@@ -218,7 +225,8 @@ def _load_trials(
         yield (
             job_id,
             tuple(
-                _build_trial(row, read(_find_recording(files, job_id, row.position))) for row in rows.get(job_id, ())
+                _build_trial(row, decode_recording(_find_recording(files, job_id, row.position)))
+                for row in rows.get(job_id, ())
             ),
         )
 
@@ -294,9 +302,9 @@ def _encode_prediction(prediction: Prediction, numbers: Mapping[Image, int]) -> 
     """Encode a prediction with its image as a number in the recording; None if the images were too large to store."""
     if not numbers:
         return None
-    where = numbers.get(prediction.image)
-    plain = cast(dict[str, Any], encode(replace(prediction, image=cast(Image, None))))
-    return plain | {"image": where if where is not None else encode(prediction.image)}
+    image_number = numbers.get(prediction.image)
+    encoded_prediction = cast(dict[str, Any], encode(replace(prediction, image=cast(Image, None))))
+    return encoded_prediction | {"image": image_number if image_number is not None else encode(prediction.image)}
 
 
 def _find_recording(files: dict[str, artifacts.File], job_id: str, position: int) -> bytes:
@@ -328,13 +336,13 @@ def _apply_override(result: CriterionResult, override: OverrideLine | None) -> C
     if override is None:
         return result
     marks, max_marks = override.compute_marks(result.max_marks)
-    excused = override.marks is None
+    is_excused = override.marks is None
     if not result.unjudged:
-        said = StaffAdjustment(result.marks, result.max_marks, override.reason, excused)
-        return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said)
+        adjustment = StaffAdjustment(result.marks, result.max_marks, override.reason, is_excused)
+        return replace(result, marks=marks, max_marks=max_marks, set_by_hand=adjustment)
     # The note that staff will review it no longer applies.
-    said = StaffAdjustment(None, result.max_marks, override.reason, excused)
-    return replace(result, marks=marks, max_marks=max_marks, set_by_hand=said, message="", unjudged="")
+    adjustment = StaffAdjustment(None, result.max_marks, override.reason, is_excused)
+    return replace(result, marks=marks, max_marks=max_marks, set_by_hand=adjustment, message="", unjudged="")
 
 
 def _build_accuracy(row: CriterionResultRow) -> Accuracy | None:
@@ -352,7 +360,17 @@ def _build_accuracy(row: CriterionResultRow) -> Accuracy | None:
     )
 
 
-def _decode_prediction(plain: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
-    where = plain["image"]
-    image = trials[plain["trial"]].recording.images[where] if isinstance(where, int) else decode(Image, where)
-    return Prediction(image, plain["truth"], plain["answer"], plain["scenario"], plain["trial"])
+def _decode_prediction(encoded_prediction: dict[str, Any], trials: tuple[TrialResult, ...]) -> Prediction:
+    image_reference = encoded_prediction["image"]
+    image = (
+        trials[encoded_prediction["trial"]].recording.images[image_reference]
+        if isinstance(image_reference, int)
+        else decode(Image, image_reference)
+    )
+    return Prediction(
+        image,
+        encoded_prediction["truth"],
+        encoded_prediction["answer"],
+        encoded_prediction["scenario"],
+        encoded_prediction["trial"],
+    )

@@ -42,12 +42,12 @@ class MarkedLine(Protocol):
 
 def load_marked_submissions(session: Session, lines: Sequence[MarkedLine]) -> list[MarkedSubmission]:
     """Return the graded jobs that are neither staff-only nor excused completely."""
-    graded = [line for line in lines if current_grades.is_for_students(line)]
-    criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded}
-    worths = dict.fromkeys(criteria, Decimal(0))
-    for begin in range(0, len(graded), _AT_ONCE):
-        some = [line.id for line in graded[begin : begin + _AT_ONCE]]
-        by_hand = overrides.load_overrides(session, some)
+    graded_lines = [line for line in lines if current_grades.is_for_students(line)]
+    criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded_lines}
+    max_marks_by_job = dict.fromkeys(criteria, Decimal(0))
+    for start in range(0, len(graded_lines), _AT_ONCE):
+        job_ids = [line.id for line in graded_lines[start : start + _AT_ONCE]]
+        overrides_by_job = overrides.load_overrides(session, job_ids)
         rows = session.execute(
             select(
                 CriterionResultRow.job_id,
@@ -57,20 +57,22 @@ def load_marked_submissions(session: Session, lines: Sequence[MarkedLine]) -> li
                 CriterionResultRow.max_marks,
                 CriterionResultRow.unjudged,
             )
-            .where(CriterionResultRow.job_id.in_(some))
+            .where(CriterionResultRow.job_id.in_(job_ids))
             .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
         )
         for job_id, criterion, title, marks, worth, unjudged in rows:
-            override = by_hand.get(job_id, {}).get(criterion)
-            worths[job_id] += worth
+            override = overrides_by_job.get(job_id, {}).get(criterion)
+            max_marks_by_job[job_id] += worth
             if override is not None:
                 criteria[job_id].append(MarkedCriterion(criterion, title, *override.compute_marks(worth)))
             elif unjudged is None:
                 criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
-    found = []
-    for line in graded:
-        worth, own = worths[line.id], tuple(criteria[line.id])
-        counted = None if line.marks is None else scale_marks(line.marks, line.max_marks, worth)
-        if counted is not None:
-            found.append(MarkedSubmission(line.student, line.assignment, counted, worth, line.verdict or "", own))
-    return found
+    marked_submissions = []
+    for line in graded_lines:
+        worth, line_criteria = max_marks_by_job[line.id], tuple(criteria[line.id])
+        scaled_marks = None if line.marks is None else scale_marks(line.marks, line.max_marks, worth)
+        if scaled_marks is not None:
+            marked_submissions.append(
+                MarkedSubmission(line.student, line.assignment, scaled_marks, worth, line.verdict or "", line_criteria)
+            )
+    return marked_submissions

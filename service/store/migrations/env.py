@@ -19,10 +19,10 @@ def _write_oldest_compatible(
 ) -> None:
     """Store the oldest revision whose code can use the tables, after a migration that names one."""
     script = step.up_revision
-    oldest = getattr(script.module, "OLDEST_COMPATIBLE", None) if isinstance(script, Script) else None
-    if ctx.connection is not None and oldest is not None:
+    oldest_revision = getattr(script.module, "OLDEST_COMPATIBLE", None) if isinstance(script, Script) else None
+    if ctx.connection is not None and oldest_revision is not None:
         ctx.connection.execute(delete(SchemaCompatibility))
-        ctx.connection.execute(insert(SchemaCompatibility).values(id=1, oldest_compatible=oldest))
+        ctx.connection.execute(insert(SchemaCompatibility).values(id=1, oldest_compatible=oldest_revision))
 
 
 context.configure(

@@ -109,20 +109,22 @@ def issue_credential(
 
     A session that is started with a ``token`` ends with it.
     """
-    at = now(session)
-    _delete_expired(session, at)
+    current_time = now(session)
+    _delete_expired(session, current_time)
     secret = _PREFIXES[kind] + secrets.token_urlsafe(32)
-    expires_at, token_id = at + lifetime, None
+    expires_at, token_id = current_time + lifetime, None
     if token is not None:
         expires_at, token_id = min(expires_at, token.expires_at), token.id
     session.add(
-        _build_row(person_id, kind, secret, at, expires_at, name=name, token_id=token_id, **_build_columns(reach))
+        _build_row(
+            person_id, kind, secret, current_time, expires_at, name=name, token_id=token_id, **_build_columns(reach)
+        )
     )
     session.flush()
     if kind is not CredentialKind.LINK:
-        _record_sign_in(session, person_id, at)
+        _record_sign_in(session, person_id, current_time)
     if kind is CredentialKind.SESSION:
-        _end_oldest_sessions(session, person_id, at)
+        _end_oldest_sessions(session, person_id, current_time)
     return secret
 
 
@@ -130,20 +132,20 @@ def create_token(
     session: Session,
     person_id: int,
     lifetime: timedelta,
-    word: str,
+    random_word: str,
     *,
     name: str,
     reach: Reach = UNLIMITED_REACH,
-    made_with: str = "",
+    parent_token_id: str = "",
 ) -> None:
     """Create a token of this person from an unguessable word. Repeating the call creates no second token.
 
-    If ``made_with`` is the id of a session that was started with a token, the new token ends with that token.
+    If ``parent_token_id`` is the id of a session that was started with a token, the new token ends with that token.
     """
-    at = now(session)
-    _delete_expired(session, at)
-    _record_sign_in(session, person_id, at)
-    expires_at, token = at + lifetime, _find_parent_token(session, made_with)
+    current_time = now(session)
+    _delete_expired(session, current_time)
+    _record_sign_in(session, person_id, current_time)
+    expires_at, token = current_time + lifetime, _find_parent_token(session, parent_token_id)
     if token is not None:
         expires_at = min(expires_at, token.expires_at)
     insert_if_new(
@@ -152,9 +154,9 @@ def create_token(
         id=generate_id(),
         person_id=person_id,
         kind=CredentialKind.TOKEN,
-        sha256=_hash_secret(_PREFIXES[CredentialKind.TOKEN] + word),
+        sha256=_hash_secret(_PREFIXES[CredentialKind.TOKEN] + random_word),
         name=name,
-        created_at=at,
+        created_at=current_time,
         expires_at=expires_at,
         token_id=None if token is None else token.id,
         **_build_columns(reach),
@@ -188,17 +190,20 @@ def replace_links(
 
     An unguessable ``word`` determines the secret for a single person, so that the caller can reproduce it.
     """
-    at = now(session)
-    _delete_expired(session, at)
+    current_time = now(session)
+    _delete_expired(session, current_time)
     links = (Credential.kind == CredentialKind.LINK, Credential.revoked_at.is_(None))
-    session.execute(update(Credential).where(*links, Credential.person_id.in_(person_ids)).values(revoked_at=at))
-    made = {person_id: build_link_secret(word or secrets.token_urlsafe(32)) for person_id in person_ids}
+    session.execute(
+        update(Credential).where(*links, Credential.person_id.in_(person_ids)).values(revoked_at=current_time)
+    )
+    secrets_by_person = {person_id: build_link_secret(word or secrets.token_urlsafe(32)) for person_id in person_ids}
     limits = _build_columns(reach)
     session.add_all(
-        _build_row(who, CredentialKind.LINK, secret, at, at + lifetime, **limits) for who, secret in made.items()
+        _build_row(who, CredentialKind.LINK, secret, current_time, current_time + lifetime, **limits)
+        for who, secret in secrets_by_person.items()
     )
     session.flush()
-    return made
+    return secrets_by_person
 
 
 def build_link_secret(word: str) -> str:
@@ -219,9 +224,11 @@ def redeem_link(session: Session, link: str) -> NewSession | None:
     row = _find_valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
-    at = now(session)
-    taken = update(Credential).where(Credential.id == row.id, Credential.used_at.is_(None)).values(used_at=at)
-    if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
+    current_time = now(session)
+    statement = (
+        update(Credential).where(Credential.id == row.id, Credential.used_at.is_(None)).values(used_at=current_time)
+    )
+    if session.execute(statement).rowcount != 1:  # type: ignore[attr-defined]
         return None
     return NewSession(
         issue_credential(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_build_reach(row))
@@ -248,18 +255,18 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
     if row is None:
         return None
     reach = _build_reach(row)
-    reached = _match_enrolments(reach)
-    query = select(Person.operator, Enrolment, and_(*reached) if reached else true())
+    reach_conditions = _match_enrolments(reach)
+    query = select(Person.operator, Enrolment, and_(*reach_conditions) if reach_conditions else true())
     query = query.outerjoin(Enrolment, Enrolment.person_id == Person.id).where(Person.id == row.person_id)
-    known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
-    in_courses = [(enrolment, is_reached) for _, enrolment, is_reached in known if enrolment is not None]
-    own = [each for each, _ in in_courses if row.course_id in (None, each.course_id)]
+    enrolment_rows = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
+    enrolments = [(enrolment, is_reached) for _, enrolment, is_reached in enrolment_rows if enrolment is not None]
+    own_enrolments = [each for each, _ in enrolments if row.course_id in (None, each.course_id)]
     return Identity(
         row.id,
         row.person_id,
-        _choose_name(row.person_id, [(each.name, each.written) for each in own]),
-        known[0][0] and reach.is_unlimited,
-        {each.course_id: each.role for each, is_reached in in_courses if is_reached},
+        _choose_name(row.person_id, [(each.name, each.written) for each in own_enrolments]),
+        enrolment_rows[0][0] and reach.is_unlimited,
+        {each.course_id: each.role for each, is_reached in enrolments if is_reached},
         None if kind is CredentialKind.SESSION and not reach.scopes else reach.scopes,
         reach,
         row.used_at is not None and row.used_at >= now(session) - _USE_INTERVAL,
@@ -268,50 +275,59 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
 
 def record_use(session: Session, credential_id: str) -> None:
     """Record the use of a token, at most once an hour."""
-    at = now(session)
+    current_time = now(session)
     row = session.get(Credential, credential_id)
-    if row is not None and (row.used_at is None or row.used_at < at - _USE_INTERVAL):
-        row.used_at = at
+    if row is not None and (row.used_at is None or row.used_at < current_time - _USE_INTERVAL):
+        row.used_at = current_time
 
 
 def revoke_credential(session: Session, credential_id: str, person_id: int, reach: Reach = UNLIMITED_REACH) -> bool:
     """Revoke a credential. Returns False if this person does not have it within ``reach``."""
-    one = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
-    return _revoke(session, *one, *_match_credentials(reach)) == 1
+    conditions = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
+    return _revoke(session, *conditions, *_match_credentials(reach)) == 1
 
 
-def revoke_all(session: Session, person_id: int, *, but: str = "", reach: Reach = UNLIMITED_REACH) -> int:
+def revoke_all(session: Session, person_id: int, *, kept_id: str = "", reach: Reach = UNLIMITED_REACH) -> int:
     """Revoke all links, sessions and tokens of a person within ``reach`` except one. Returns the number revoked."""
-    theirs = (Credential.person_id == person_id, Credential.id != but, *_match_valid(now(session)))
-    return _revoke(session, *theirs, *_match_credentials(reach))
+    conditions = (Credential.person_id == person_id, Credential.id != kept_id, *_match_valid(now(session)))
+    return _revoke(session, *conditions, *_match_credentials(reach))
 
 
 def revoke_for_course(session: Session, person_id: int, course_id: int) -> int:
     """Revoke all credentials of a person that reach a course. Returns the number revoked."""
-    reaches = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
-    return _revoke(session, Credential.person_id == person_id, reaches, *_match_valid(now(session)))
+    has_reach = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
+    return _revoke(session, Credential.person_id == person_id, has_reach, *_match_valid(now(session)))
 
 
-def _revoke(session: Session, *which: ColumnElement[bool]) -> int:
+def _revoke(session: Session, *conditions: ColumnElement[bool]) -> int:
     """Revoke credentials and everything made with them. Returns the number without what was made with them."""
-    at = now(session)
-    ended = session.execute(update(Credential).where(*which).values(revoked_at=at))
-    made = update(Credential).where(Credential.revoked_at.is_(None), _match_revoked_parent()).values(revoked_at=at)
-    while session.execute(made, execution_options={"synchronize_session": False}).rowcount:  # type: ignore[attr-defined]
+    current_time = now(session)
+    revoked_rows = session.execute(update(Credential).where(*conditions).values(revoked_at=current_time))
+    revoke_derived = (
+        update(Credential)
+        .where(Credential.revoked_at.is_(None), _match_revoked_parent())
+        .values(revoked_at=current_time)
+    )
+    while session.execute(revoke_derived, execution_options={"synchronize_session": False}).rowcount:  # type: ignore[attr-defined]
         pass
-    return int(ended.rowcount)  # type: ignore[attr-defined]
+    return int(revoked_rows.rowcount)  # type: ignore[attr-defined]
 
 
 def list_credentials(session: Session, person_id: int, reach: Reach = UNLIMITED_REACH) -> list[CredentialLine]:
     """Return a person's valid sessions and tokens within ``reach``, newest first."""
-    of_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
-    theirs = (Credential.person_id == person_id, of_kind, *_match_valid(now(session)), *_match_credentials(reach))
+    is_listed_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
+    conditions = (
+        Credential.person_id == person_id,
+        is_listed_kind,
+        *_match_valid(now(session)),
+        *_match_credentials(reach),
+    )
     return [
         CredentialLine(
             row.id, row.kind, row.name, tuple(row.scopes), row.course_id, row.created_at, row.expires_at, row.used_at
         )
         for row in session.scalars(
-            select(Credential).where(*theirs).order_by(Credential.created_at.desc(), Credential.id)
+            select(Credential).where(*conditions).order_by(Credential.created_at.desc(), Credential.id)
         )
     ]
 
@@ -324,13 +340,13 @@ def load_person_name(session: Session, person_id: int, course_id: int | None = N
     query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == person_id)
     if course_id is not None:
         query = query.where(Enrolment.course_id == course_id)
-    known = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
-    return _choose_name(person_id, [(name, written) for name, written in known])
+    name_rows = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
+    return _choose_name(person_id, [(name, written) for name, written in name_rows])
 
 
-def _choose_name(person_id: int, known: Sequence[tuple[str, str]]) -> str:
+def _choose_name(person_id: int, names_and_ids: Sequence[tuple[str, str]]) -> str:
     """Return the first name among a person's enrolments, otherwise the first id."""
-    names = [name for name, _ in known if name] or [written for _, written in known if written]
+    names = [name for name, _ in names_and_ids if name] or [written for _, written in names_and_ids if written]
     return names[0] if names else f"person {person_id}"
 
 
@@ -349,15 +365,15 @@ def _build_columns(reach: Reach) -> dict[str, Any]:
 
 def _match_enrolments(reach: Reach) -> list[ColumnElement[bool]]:
     """Return the conditions for the enrolments within a credential's reach."""
-    found: list[ColumnElement[bool]] = []
+    conditions: list[ColumnElement[bool]] = []
     if reach.course_id is not None:
-        found.append(Enrolment.course_id == reach.course_id)
+        conditions.append(Enrolment.course_id == reach.course_id)
     if reach.role is not None:
-        found.append(Enrolment.role == reach.role)
+        conditions.append(Enrolment.role == reach.role)
     if reach.platform_id is not None:
-        launched = select(LtiCourse.course_id).where(LtiCourse.platform_id == reach.platform_id)
-        found.append(Enrolment.course_id.in_(launched))
-    return found
+        launched_courses = select(LtiCourse.course_id).where(LtiCourse.platform_id == reach.platform_id)
+        conditions.append(Enrolment.course_id.in_(launched_courses))
+    return conditions
 
 
 def _match_credentials(reach: Reach) -> list[ColumnElement[bool]]:
@@ -370,9 +386,9 @@ def _match_credentials(reach: Reach) -> list[ColumnElement[bool]]:
     return [column == limit for column, limit in limits if limit is not None]
 
 
-def _match_valid(at: datetime) -> tuple[ColumnElement[bool], ...]:
+def _match_valid(current_time: datetime) -> tuple[ColumnElement[bool], ...]:
     is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
-    return Credential.revoked_at.is_(None), Credential.expires_at > at, is_unused, ~_match_revoked_parent()
+    return Credential.revoked_at.is_(None), Credential.expires_at > current_time, is_unused, ~_match_revoked_parent()
 
 
 def _match_revoked_parent() -> ColumnElement[bool]:
@@ -380,39 +396,50 @@ def _match_revoked_parent() -> ColumnElement[bool]:
     return exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
 
 
-def _record_sign_in(session: Session, person_id: int, at: datetime) -> None:
-    session.execute(update(Person).where(Person.id == person_id, Person.signed_in_at.is_(None)).values(signed_in_at=at))
+def _record_sign_in(session: Session, person_id: int, current_time: datetime) -> None:
+    session.execute(
+        update(Person).where(Person.id == person_id, Person.signed_in_at.is_(None)).values(signed_in_at=current_time)
+    )
 
 
-def _end_oldest_sessions(session: Session, person_id: int, at: datetime) -> None:
-    theirs = (Credential.person_id == person_id, Credential.kind == CredentialKind.SESSION, *_match_valid(at))
-    newest = select(Credential.id).where(*theirs).order_by(Credential.created_at.desc(), Credential.id)
-    kept = list(session.scalars(newest.limit(MOST_SESSIONS)))
-    _revoke(session, *theirs, Credential.id.not_in(kept))
+def _end_oldest_sessions(session: Session, person_id: int, current_time: datetime) -> None:
+    conditions = (
+        Credential.person_id == person_id,
+        Credential.kind == CredentialKind.SESSION,
+        *_match_valid(current_time),
+    )
+    newest_query = select(Credential.id).where(*conditions).order_by(Credential.created_at.desc(), Credential.id)
+    kept_ids = list(session.scalars(newest_query.limit(MOST_SESSIONS)))
+    _revoke(session, *conditions, Credential.id.not_in(kept_ids))
 
 
 def _find_valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:
     if not secret.startswith(_PREFIXES[kind]) or len(secret) > 100:
         return None
-    mine = (Credential.sha256 == _hash_secret(secret), Credential.kind == kind)
-    return session.scalar(select(Credential).where(*mine, *_match_valid(now(session))))
+    conditions = (Credential.sha256 == _hash_secret(secret), Credential.kind == kind)
+    return session.scalar(select(Credential).where(*conditions, *_match_valid(now(session))))
 
 
 def _build_row(
-    person_id: int, kind: CredentialKind, secret: str, at: datetime, expires_at: datetime, **columns: Any
+    person_id: int, kind: CredentialKind, secret: str, current_time: datetime, expires_at: datetime, **columns: Any
 ) -> Credential:
     return Credential(
-        person_id=person_id, kind=kind, sha256=_hash_secret(secret), created_at=at, expires_at=expires_at, **columns
+        person_id=person_id,
+        kind=kind,
+        sha256=_hash_secret(secret),
+        created_at=current_time,
+        expires_at=expires_at,
+        **columns,
     )
 
 
-def _delete_expired(session: Session, at: datetime) -> None:
+def _delete_expired(session: Session, current_time: datetime) -> None:
     """Delete credentials that expired long ago.
 
     Tokens are kept, because stored replies refer to them. The activity log names people, not credentials.
     """
-    expired = (Credential.expires_at < at - _RETENTION, Credential.kind != CredentialKind.TOKEN)
-    session.execute(delete(Credential).where(*expired))
+    is_expired = (Credential.expires_at < current_time - _RETENTION, Credential.kind != CredentialKind.TOKEN)
+    session.execute(delete(Credential).where(*is_expired))
 
 
 def _hash_secret(secret: str) -> str:

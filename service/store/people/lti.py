@@ -63,8 +63,8 @@ class Platform(Registration):
     def has_registered_origin(self, url: str) -> bool:
         """Return whether the origin of this address is registered, in a platform address or as a service origin."""
         origin = parse_origin(url)
-        own = (parse_origin(each) for each in (self.authorization_url, self.token_url, self.keys_url))
-        return origin is not None and origin in {*own, *self.service_origins}
+        own_origins = (parse_origin(each) for each in (self.authorization_url, self.token_url, self.keys_url))
+        return origin is not None and origin in {*own_origins, *self.service_origins}
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,36 +107,40 @@ def parse_origin(url: str) -> str | None:
     return f"{parts.scheme}://{host}:{port}"
 
 
-def register_platform(session: Session, asked: Registration) -> int:
+def register_platform(session: Session, registration: Registration) -> int:
     """Register a platform, or update the one with the same issuer and client. Returns its id.
 
     Raises UsageError for an id that is too long, and for an address without a host or that does not begin with https://
     or http://.
     """
-    for kind, value in (("issuer", asked.issuer), ("client", asked.client_id)):
+    for kind, value in (("issuer", registration.issuer), ("client", registration.client_id)):
         if len(value) > LONGEST_REGISTERED:
             raise UsageError(f"the platform's {kind} is longer than {LONGEST_REGISTERED} characters")
-    deployments = sorted(asked.deployments)
+    deployments = sorted(registration.deployments)
     for deployment in deployments:
         _check_id("deployment", deployment)
-    origins = {parse_origin(each): each for each in asked.service_origins}
+    origins = {parse_origin(each): each for each in registration.service_origins}
     if None in origins:
         raise UsageError(f"the service address is {origins[None]!r}, expected one like https://platform.example.org")
-    for what, url in (("login", asked.authorization_url), ("token", asked.token_url), ("keys", asked.keys_url)):
+    for subject, url in (
+        ("login", registration.authorization_url),
+        ("token", registration.token_url),
+        ("keys", registration.keys_url),
+    ):
         if not url.startswith(("https://", "http://")) or parse_origin(url) is None:
-            raise UsageError(f"the {what} address is {url!r}, expected one like https://platform.example.org/path")
+            raise UsageError(f"the {subject} address is {url!r}, expected one like https://platform.example.org/path")
     values = {
-        "name": asked.name,
+        "name": registration.name,
         "deployments": deployments,
-        "authorization_url": asked.authorization_url,
-        "token_url": asked.token_url,
-        "keys_url": asked.keys_url,
+        "authorization_url": registration.authorization_url,
+        "token_url": registration.token_url,
+        "keys_url": registration.keys_url,
         "service_origins": sorted(filter(None, origins)),
     }
-    identity = {"issuer": asked.issuer, "client_id": asked.client_id}
+    identity = {"issuer": registration.issuer, "client_id": registration.client_id}
     insert_if_new(session, LtiPlatform, created_at=now(session), **identity, **values)
-    same = (LtiPlatform.issuer == asked.issuer, LtiPlatform.client_id == asked.client_id)
-    row = session.scalars(select(LtiPlatform).where(*same).with_for_update(key_share=True)).one()
+    is_same = (LtiPlatform.issuer == registration.issuer, LtiPlatform.client_id == registration.client_id)
+    row = session.scalars(select(LtiPlatform).where(*is_same).with_for_update(key_share=True)).one()
     for column, setting in values.items():
         setattr(row, column, setting)
     session.flush()
@@ -155,8 +159,8 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
     query = select(LtiPlatform).where(LtiPlatform.issuer == issuer)
     if client_id is not None:
         query = query.where(LtiPlatform.client_id == client_id)
-    found = session.scalars(query.limit(2)).all()
-    return _build_platform(found[0]) if len(found) == 1 else None
+    platform_rows = session.scalars(query.limit(2)).all()
+    return _build_platform(platform_rows[0]) if len(platform_rows) == 1 else None
 
 
 def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
@@ -165,10 +169,12 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
     At most ``MOST_PENDING`` launches of a platform are kept.
     """
     _lock_platform(session, platform)
-    at, of_platform = now(session), LtiLaunch.platform_id == platform.id
-    newest_first = select(LtiLaunch.state_sha256).where(of_platform).order_by(LtiLaunch.expires_at.desc())
-    too_old = or_(LtiLaunch.expires_at < at, LtiLaunch.state_sha256.in_(newest_first.offset(MOST_PENDING - 1)))
-    session.execute(delete(LtiLaunch).where(of_platform, too_old).execution_options(synchronize_session=False))
+    current_time, is_same_platform = now(session), LtiLaunch.platform_id == platform.id
+    newest_first = select(LtiLaunch.state_sha256).where(is_same_platform).order_by(LtiLaunch.expires_at.desc())
+    is_expired = or_(
+        LtiLaunch.expires_at < current_time, LtiLaunch.state_sha256.in_(newest_first.offset(MOST_PENDING - 1))
+    )
+    session.execute(delete(LtiLaunch).where(is_same_platform, is_expired).execution_options(synchronize_session=False))
     state, nonce = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     session.add(
         LtiLaunch(
@@ -176,7 +182,7 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
             platform_id=platform.id,
             nonce=nonce,
             target=target,
-            expires_at=at + _LAUNCH_LIFETIME,
+            expires_at=current_time + _LAUNCH_LIFETIME,
         )
     )
     return state, nonce
@@ -249,12 +255,12 @@ def enrol_subject(
         raise UsageError("the platform's user ID is longer than %(most)s characters", most=_LONGEST_STUDENT)
     _lock_platform(session, platform)
     session.get_one(Course, course_id, with_for_update={"key_share": True})
-    of_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
-    known = session.scalar(select(LtiPerson).where(*of_subject))
-    row = None if known is None else _find_enrolment(session, known.person_id, course_id)
+    is_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
+    known_person = session.scalar(select(LtiPerson).where(*is_subject))
+    row = None if known_person is None else _find_enrolment(session, known_person.person_id, course_id)
     if row is None:
-        row = _create_enrolment(session, course_id, student, None if known is None else known.person_id)
-        if known is None:
+        row = _create_enrolment(session, course_id, student, None if known_person is None else known_person.person_id)
+        if known_person is None:
             session.add(LtiPerson(platform_id=platform.id, subject=subject, person_id=row.person_id))
     row.name, row.email = student.name or row.name, student.email or row.email
     set_role(session, row, role)
@@ -276,10 +282,10 @@ def _create_enrolment(session: Session, course_id: int, student: Student, person
     # Existing links to it would sign in another user as this person.
     credentials.revoke_all(session, row.person_id)
     if person_id is not None:
-        nobody, row.person_id = row.person_id, person_id
+        unused_person_id, row.person_id = row.person_id, person_id
         session.flush()
-        session.execute(delete(Credential).where(Credential.person_id == nobody))
-        session.execute(delete(Person).where(Person.id == nobody))
+        session.execute(delete(Credential).where(Credential.person_id == unused_person_id))
+        session.execute(delete(Person).where(Person.id == unused_person_id))
     return row
 
 
@@ -291,8 +297,8 @@ def _is_unclaimed(session: Session, row: Enrolment) -> bool:
 
 
 def _find_enrolment(session: Session, person_id: int, course_id: int) -> Enrolment | None:
-    in_course = (Enrolment.person_id == person_id, Enrolment.course_id == course_id)
-    return session.scalar(select(Enrolment).where(*in_course).limit(1))
+    conditions = (Enrolment.person_id == person_id, Enrolment.course_id == course_id)
+    return session.scalar(select(Enrolment).where(*conditions).limit(1))
 
 
 def _find_context_course(
@@ -303,23 +309,23 @@ def _find_context_course(
     A course without a recorded deployment is assigned to the first deployment from which one of its instructors
     launches it.
     """
-    of_context = (LtiCourse.platform_id == platform.id, LtiCourse.context == context)
-    found = session.scalar(select(LtiCourse).where(*of_context, LtiCourse.deployment == deployment))
-    if found is not None:
-        return found
-    unknown = session.scalar(select(LtiCourse).where(*of_context, LtiCourse.deployment == ""))
-    if unknown is None:
+    is_context = (LtiCourse.platform_id == platform.id, LtiCourse.context == context)
+    course_row = session.scalar(select(LtiCourse).where(*is_context, LtiCourse.deployment == deployment))
+    if course_row is not None:
+        return course_row
+    undeployed_row = session.scalar(select(LtiCourse).where(*is_context, LtiCourse.deployment == ""))
+    if undeployed_row is None:
         return None
-    instructs = (
+    instructor_query = (
         select(Enrolment.id)
         .join(LtiPerson, LtiPerson.person_id == Enrolment.person_id)
         .where(LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
-        .where(Enrolment.course_id == unknown.course_id, Enrolment.role == Role.INSTRUCTOR)
+        .where(Enrolment.course_id == undeployed_row.course_id, Enrolment.role == Role.INSTRUCTOR)
     )
-    if session.scalar(instructs.limit(1)) is None:
+    if session.scalar(instructor_query.limit(1)) is None:
         return None
-    unknown.deployment = deployment
-    return unknown
+    undeployed_row.deployment = deployment
+    return undeployed_row
 
 
 def _lock_platform(session: Session, platform: Platform) -> None:

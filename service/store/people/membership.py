@@ -45,18 +45,18 @@ class CourseLine:
     students: int
 
 
-def make_instructor(session: Session, course: str, who: Student) -> Member:
+def make_instructor(session: Session, course: str, student: Student) -> Member:
     """Make a person an instructor of the course, creating the course if necessary.
 
     An id is local to its course: the same id in another course is another person, until an operator joins the two.
     Raises UsageError if a student of the course has this id, because anyone who can sign in as that student would
     become an instructor.
     """
-    course_id, own = ensure_course(session, course, now(session)), normalise_name(who.id)
-    taken = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == own)
-    if session.scalar(taken) is Role.STUDENT:
-        raise UsageError(f"{own!r} is a student of this course, expected another id for an instructor")
-    return _enrol_member(session, course, who, Role.INSTRUCTOR)
+    course_id, normal_id = ensure_course(session, course, now(session)), normalise_name(student.id)
+    role_query = select(Enrolment.role).where(Enrolment.course_id == course_id, Enrolment.student == normal_id)
+    if session.scalar(role_query) is Role.STUDENT:
+        raise UsageError(f"{normal_id!r} is a student of this course, expected another id for an instructor")
+    return _enrol_member(session, course, student, Role.INSTRUCTOR)
 
 
 def set_role(session: Session, row: Enrolment, role: Role) -> None:
@@ -68,13 +68,13 @@ def set_role(session: Session, row: Enrolment, role: Role) -> None:
 
 def find_same_id_instructors(session: Session, enrolment_id: int) -> list[tuple[str, Member]]:
     """Return instructors with the same id in other courses who are different persons, with the course names."""
-    own = session.get_one(Enrolment, enrolment_id)
+    own_enrolment = session.get_one(Enrolment, enrolment_id)
     query = (
         select(Course.name, Enrolment, Person)
         .join(Course, Enrolment.course_id == Course.id)
         .join(Person, Enrolment.person_id == Person.id)
-        .where(Enrolment.student == own.student, Enrolment.role == Role.INSTRUCTOR)
-        .where(Enrolment.person_id != own.person_id)
+        .where(Enrolment.student == own_enrolment.student, Enrolment.role == Role.INSTRUCTOR)
+        .where(Enrolment.person_id != own_enrolment.person_id)
         .order_by(Course.name)
     )
     return [(course, _build_member(enrolment, person)) for course, enrolment, person in session.execute(query)]
@@ -102,8 +102,8 @@ def merge_persons(session: Session, person_id: int, other_id: int) -> None:
 
     The caller must have locked both.
     """
-    for each in (person_id, other_id):
-        credentials.revoke_all(session, each)
+    for merged_id in (person_id, other_id):
+        credentials.revoke_all(session, merged_id)
     for column in (Enrolment.person_id, LtiPerson.person_id, Credential.person_id):
         session.execute(update(column.class_).where(column == other_id).values(person_id=person_id))
     person, other = session.get_one(Person, person_id), session.get_one(Person, other_id)
@@ -113,9 +113,9 @@ def merge_persons(session: Session, person_id: int, other_id: int) -> None:
     session.flush()
 
 
-def make_student(session: Session, course: str, who: Student) -> Member:
+def make_student(session: Session, course: str, student: Student) -> Member:
     """Enrol a person as a student, replacing any earlier role in the course."""
-    return _enrol_member(session, course, who, Role.STUDENT)
+    return _enrol_member(session, course, student, Role.STUDENT)
 
 
 def make_operator(session: Session, person_id: int) -> None:
@@ -123,14 +123,14 @@ def make_operator(session: Session, person_id: int) -> None:
     session.get_one(Person, person_id).operator = True
 
 
-def load_member(session: Session, course: str, written: str) -> Member:
+def load_member(session: Session, course: str, member_id: str) -> Member:
     """Return a member of the course by id. Raises UsageError for an unknown course or person."""
-    return _load_member_by_id(session, Students(session, find_course(session, course)).load_enrolment(written))
+    return _load_member_by_id(session, Students(session, find_course(session, course)).load_enrolment(member_id))
 
 
-def find_member(session: Session, course_id: int, who: Student) -> Member | None:
+def find_member(session: Session, course_id: int, student: Student) -> Member | None:
     """Return the member of the course with this id; None if there is none."""
-    enrolment_id = Students(session, course_id).find_enrolment(who)
+    enrolment_id = Students(session, course_id).find_enrolment(student)
     return None if enrolment_id is None else _load_member_by_id(session, enrolment_id)
 
 
@@ -205,12 +205,12 @@ def _match_other_access() -> ColumnElement[bool]:
     return or_(Person.operator, exists().where(other.person_id == Enrolment.person_id, other.id != Enrolment.id))
 
 
-def _enrol_member(session: Session, course: str, who: Student, role: Role) -> Member:
-    at = now(session)
-    enrolment_id = Students(session, ensure_course(session, course, at)).enrol(who, at)
+def _enrol_member(session: Session, course: str, student: Student, role: Role) -> Member:
+    current_time = now(session)
+    enrolment_id = Students(session, ensure_course(session, course, current_time)).enrol(student, current_time)
     row = session.get_one(Enrolment, enrolment_id)
     set_role(session, row, role)
-    row.name, row.email = who.name or row.name, who.email or row.email
+    row.name, row.email = student.name or row.name, student.email or row.email
     session.flush()
     return _load_member_by_id(session, enrolment_id)
 

@@ -24,9 +24,9 @@ from submissions.suggestions import suggest_name
 DEFAULT_COURSE = "default"
 
 
-def ensure_course(session: Session, name: str, at: datetime) -> int:
+def ensure_course(session: Session, name: str, current_time: datetime) -> int:
     """Return the id of a course, creating it if necessary, and lock it: numbering attempts needs a single writer."""
-    insert_if_new(session, Course, name=name, created_at=at)
+    insert_if_new(session, Course, name=name, created_at=current_time)
     return session.scalars(select(Course.id).where(Course.name == name).with_for_update(key_share=True)).one()
 
 
@@ -38,34 +38,36 @@ class Students:
         self._course_id = course_id
         self._by_form: dict[str, dict[str, int]] | None = None
 
-    def enrol(self, student: Student, at: datetime) -> int:
+    def enrol(self, student: Student, current_time: datetime) -> int:
         """Return the enrolment of the student with this id, creating it if necessary.
 
         An id that is not in normal form matches only the spelling that was enrolled first. Name and e-mail address are
         updated. Raises UsageError for an empty id, or one that is ambiguous.
         """
-        own, written = normalise_name(student.id), unicodedata.normalize("NFC", student.id)
-        if not own:
+        normal_id, written_id = normalise_name(student.id), unicodedata.normalize("NFC", student.id)
+        if not normal_id:
             raise UsageError("the name of the student is empty, expected visible characters.")
-        found = self._find_row(own)
-        if found is None:
-            others = self._find_confusable(own)
+        enrolment = self._find_row(normal_id)
+        if enrolment is None:
+            confusable_rows = self._find_confusable(normal_id)
             # Enrolments from before normal forms may have surrounding blanks.
-            same = [enrolment_id for other, enrolment_id in others.items() if normalise_name(other) == own]
-            if len(same) == 1:
-                self._update_contact(same[0], student)
-                return same[0]
-            if not others:
-                return self._create_enrolment(own, written, student, at)
+            matching_ids = [
+                enrolment_id for other, enrolment_id in confusable_rows.items() if normalise_name(other) == normal_id
+            ]
+            if len(matching_ids) == 1:
+                self._update_contact(matching_ids[0], student)
+                return matching_ids[0]
+            if not confusable_rows:
+                return self._create_enrolment(normal_id, written_id, student, current_time)
         else:
-            others = {own: found.id}
-            if written == own:
-                found.written = own
-            if written == found.written:
-                self._update_contact(found.id, student)
-                return found.id
+            confusable_rows = {normal_id: enrolment.id}
+            if written_id == normal_id:
+                enrolment.written = normal_id
+            if written_id == enrolment.written:
+                self._update_contact(enrolment.id, student)
+                return enrolment.id
         raise UsageError(
-            f'"{sanitise_name(written)}" {describe_look_alikes(list(others)[:3])}, who is in this course; '
+            f'"{sanitise_name(written_id)}" {describe_look_alikes(list(confusable_rows)[:3])}, who is in this course; '
             "expected that name as it is written there, or another."
         )
 
@@ -78,23 +80,26 @@ class Students:
 
     def find_enrolment(self, student: Student) -> int | None:
         """Return the enrolment of the student with this normal form; None if there is none, or it is ambiguous."""
-        found = self._find_row(normalise_name(student.id))
-        return None if found is None else found.id
+        enrolment = self._find_row(normalise_name(student.id))
+        return None if enrolment is None else enrolment.id
 
-    def load_enrolment(self, written: str) -> int:
+    def load_enrolment(self, written_id: str) -> int:
         """Return the enrolment of the student with this id.
 
         Raises UsageError, with a similar id if there is one, for a student who is not in the course.
         """
-        found = self._find_row(normalise_name(written))
-        if found is not None:
-            return found.id
-        known = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
-        hint = suggest_name(written, known) or "; to enrol a student without submissions, use robomark course enrol"
-        raise UsageError(f"there is no student {sanitise_name(written)!r} in this course{hint}")
+        enrolment = self._find_row(normalise_name(written_id))
+        if enrolment is not None:
+            return enrolment.id
+        known_students = self._session.scalars(select(Enrolment.student).where(Enrolment.course_id == self._course_id))
+        hint = (
+            suggest_name(written_id, known_students)
+            or "; to enrol a student without submissions, use robomark course enrol"
+        )
+        raise UsageError(f"there is no student {sanitise_name(written_id)!r} in this course{hint}")
 
-    def _find_row(self, own: str) -> Enrolment | None:
-        query = select(Enrolment).where(Enrolment.course_id == self._course_id, Enrolment.student == own)
+    def _find_row(self, normal_id: str) -> Enrolment | None:
+        query = select(Enrolment).where(Enrolment.course_id == self._course_id, Enrolment.student == normal_id)
         return self._session.scalars(query).one_or_none()
 
     def _update_contact(self, enrolment_id: int, student: Student) -> None:
@@ -103,22 +108,22 @@ class Students:
         if row.role is Role.STUDENT:
             row.name, row.email = student.name or row.name, student.email or row.email
 
-    def _create_enrolment(self, own: str, written: str, student: Student, at: datetime) -> int:
-        person = Person(created_at=at)
+    def _create_enrolment(self, normal_id: str, written_id: str, student: Student, current_time: datetime) -> int:
+        person = Person(created_at=current_time)
         self._session.add(person)
         self._session.flush()
         row = Enrolment(
             course_id=self._course_id,
             person_id=person.id,
-            student=own,
-            written=written,
+            student=normal_id,
+            written=written_id,
             role=Role.STUDENT,
             name=student.name,
             email=student.email,
         )
         self._session.add(row)
         self._session.flush()
-        self._index_name(own, row.id)
+        self._index_name(normal_id, row.id)
         return row.id
 
     def _find_confusable(self, name: str) -> dict[str, int]:

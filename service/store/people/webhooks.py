@@ -53,15 +53,15 @@ def create_webhook(session: Session, course_id: int, url: str, events: Collectio
     Raises UsageError for an invalid address or event, or if the course has too many webhooks.
     """
     _check_url(url)
-    known = [event.value for event in WebhookEvent]
-    if not events or not set(events) <= set(known):
-        raise UsageError(f"events: expected some of {', '.join(known)}")
-    of_course = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
-    if (session.scalar(select(func.count()).select_from(Webhook).where(*of_course)) or 0) >= MOST_WEBHOOKS:
+    event_names = [event.value for event in WebhookEvent]
+    if not events or not set(events) <= set(event_names):
+        raise UsageError(f"events: expected some of {', '.join(event_names)}")
+    is_active = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
+    if (session.scalar(select(func.count()).select_from(Webhook).where(*is_active)) or 0) >= MOST_WEBHOOKS:
         raise UsageError(f"this course has {MOST_WEBHOOKS} webhooks; revoke one first")
     secret = secrets.token_hex(32)
-    chosen = [event for event in known if event in events]
-    row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen, created_at=now(session))
+    chosen_events = [event for event in event_names if event in events]
+    row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen_events, created_at=now(session))
     session.add(row)
     session.flush()
     return _build_line(row), secret
@@ -69,8 +69,10 @@ def create_webhook(session: Session, course_id: int, url: str, events: Collectio
 
 def list_webhooks(session: Session, course_id: int) -> list[WebhookLine]:
     """Return the active webhooks of a course, oldest first."""
-    mine = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
-    return [_build_line(row) for row in session.scalars(select(Webhook).where(*mine).order_by(Webhook.created_at))]
+    conditions = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
+    return [
+        _build_line(row) for row in session.scalars(select(Webhook).where(*conditions).order_by(Webhook.created_at))
+    ]
 
 
 def revoke_webhook(session: Session, course_id: int, webhook_id: str) -> bool:
@@ -79,19 +81,19 @@ def revoke_webhook(session: Session, course_id: int, webhook_id: str) -> bool:
     if row is None or row.course_id != course_id or row.revoked_at is not None:
         return False
     row.revoked_at = now(session)
-    waiting = (Delivery.webhook_id == webhook_id, Delivery.delivered_at.is_(None))
-    session.execute(update(Delivery).where(*waiting).values(due_at=None, error="the webhook was revoked"))
+    is_pending = (Delivery.webhook_id == webhook_id, Delivery.delivered_at.is_(None))
+    session.execute(update(Delivery).where(*is_pending).values(due_at=None, error="the webhook was revoked"))
     return True
 
 
 def list_deliveries(
-    session: Session, course_id: int, limit: int, after: tuple[datetime, str] | None
+    session: Session, course_id: int, limit: int, cursor: tuple[datetime, str] | None
 ) -> list[DeliveryLine]:
     """Return deliveries of a course, newest first, after the one with this time and id."""
     query = select(Delivery).join(Webhook, Delivery.webhook_id == Webhook.id).where(Webhook.course_id == course_id)
-    if after is not None:
-        same = (Delivery.made_at == after[0]) & (Delivery.id > after[1])
-        query = query.where((Delivery.made_at < after[0]) | same)
+    if cursor is not None:
+        same_time = (Delivery.made_at == cursor[0]) & (Delivery.id > cursor[1])
+        query = query.where((Delivery.made_at < cursor[0]) | same_time)
     return [
         DeliveryLine(
             row.id,
@@ -110,10 +112,10 @@ def list_deliveries(
 def _check_url(url: str) -> None:
     try:
         parts = urlsplit(url)
-        well = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
+        is_valid = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
     except ValueError:
-        well = False
-    if not well or not url.isascii() or not url.isprintable() or " " in url or len(url) > LONGEST_URL:
+        is_valid = False
+    if not is_valid or not url.isascii() or not url.isprintable() or " " in url or len(url) > LONGEST_URL:
         raise UsageError("url: expected http:// or https:// with a name, in ASCII")
     if parts.username is not None or parts.fragment:
         raise UsageError("url: expected neither a user nor a fragment in it")

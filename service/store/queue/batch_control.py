@@ -54,12 +54,12 @@ def cancel_batch(session: Session, batch_id: str) -> BatchControlResult:
     """
     _lock_batch(session, batch_id)
     _check_not_web_batch(session, batch_id)
-    waiting, running = _count_unfinished(session, batch_id)
-    if waiting + running == 0:
+    queued_count, running_count = _count_unfinished(session, batch_id)
+    if queued_count + running_count == 0:
         return BatchControlResult(False, 0, 0)
     jobs.cancel_jobs(session, batch_id, "the batch was cancelled", now(session))
     session.execute(update(Batch).where(Batch.id == batch_id).values(state=BatchState.CANCELLED))
-    return BatchControlResult(True, waiting, running)
+    return BatchControlResult(True, queued_count, running_count)
 
 
 def retry_dead_jobs(session: Session, batch_id: str | None) -> RetryCounts:
@@ -68,34 +68,36 @@ def retry_dead_jobs(session: Session, batch_id: str | None) -> RetryCounts:
     Raises UsageError for a cancelled batch; with None, jobs of cancelled batches are skipped.
     """
     if batch_id is None:
-        cancelled = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
-        of_batch = or_(Job.batch_id.is_(None), Job.batch_id.not_in(cancelled))
+        cancelled_batches = select(Batch.id).where(Batch.state == BatchState.CANCELLED)
+        is_selected = or_(Job.batch_id.is_(None), Job.batch_id.not_in(cancelled_batches))
     else:
         _check_not_cancelled(_lock_batch(session, batch_id), batch_id)
-        of_batch = Job.batch_id == batch_id
-    newer = aliased(SubmissionRow)
-    outdated = exists().where(
-        newer.enrolment_id == SubmissionRow.enrolment_id,
-        newer.assignment == SubmissionRow.assignment,
-        newer.attempt > SubmissionRow.attempt,
-        newer.staff_only.is_(None),
+        is_selected = Job.batch_id == batch_id
+    newer_submission = aliased(SubmissionRow)
+    has_newer_attempt = exists().where(
+        newer_submission.enrolment_id == SubmissionRow.enrolment_id,
+        newer_submission.assignment == SubmissionRow.assignment,
+        newer_submission.attempt > SubmissionRow.attempt,
+        newer_submission.staff_only.is_(None),
     )
-    of_newest = select(SubmissionRow.id).where(~outdated)
-    queued = jobs.retry_jobs(session, (of_batch, Job.submission_id.in_(of_newest)), now(session))
-    left = session.scalar(select(func.count()).select_from(Job).where(of_batch, Job.state == JobState.DEAD)) or 0
-    return RetryCounts(queued, left)
+    newest_submissions = select(SubmissionRow.id).where(~has_newer_attempt)
+    queued_count = jobs.retry_jobs(session, (is_selected, Job.submission_id.in_(newest_submissions)), now(session))
+    remaining_count = (
+        session.scalar(select(func.count()).select_from(Job).where(is_selected, Job.state == JobState.DEAD)) or 0
+    )
+    return RetryCounts(queued_count, remaining_count)
 
 
 def _set_state(session: Session, batch_id: str, state: BatchState) -> BatchControlResult:
-    before = _lock_batch(session, batch_id)
-    _check_not_cancelled(before, batch_id)
+    previous_state = _lock_batch(session, batch_id)
+    _check_not_cancelled(previous_state, batch_id)
     _check_not_web_batch(session, batch_id)
     session.execute(update(Batch).where(Batch.id == batch_id).values(state=state))
     # So that workers are notified immediately of resumed jobs.
-    waiting = (Job.batch_id == batch_id, Job.state == JobState.QUEUED)
-    unannounced = update(Job).where(match_and_lock_jobs(*waiting), *waiting).values(notified_at=None)
-    session.execute(unannounced, execution_options={"synchronize_session": False})
-    return BatchControlResult(before is not state, *_count_unfinished(session, batch_id))
+    is_queued = (Job.batch_id == batch_id, Job.state == JobState.QUEUED)
+    statement = update(Job).where(match_and_lock_jobs(*is_queued), *is_queued).values(notified_at=None)
+    session.execute(statement, execution_options={"synchronize_session": False})
+    return BatchControlResult(previous_state is not state, *_count_unfinished(session, batch_id))
 
 
 def _lock_batch(session: Session, batch_id: str) -> BatchState:
@@ -121,6 +123,6 @@ def _check_not_web_batch(session: Session, batch_id: str) -> None:
 
 
 def _count_unfinished(session: Session, batch_id: str) -> tuple[int, int]:
-    counted = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
-    states = dict(session.execute(counted).all())
+    count_query = select(Job.state, func.count()).where(Job.batch_id == batch_id).group_by(Job.state)
+    states = dict(session.execute(count_query).all())
     return states.get(JobState.QUEUED, 0), states.get(JobState.RUNNING, 0)

@@ -93,89 +93,97 @@ class RetryPolicy:
         return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _LONGEST_BACKOFF)
 
 
-def enqueue(session: Session, job: Job, at: datetime) -> str:
+def enqueue(session: Session, job: Job, current_time: datetime) -> str:
     """Queue a new job and return its id."""
     job.state = ENQUEUE.after
-    job.queued_at = job.due_at = at
+    job.queued_at = job.due_at = current_time
     session.add(job)
     session.flush()
     return job.id
 
 
-def copy_grade(session: Session, job_id: str, source_id: str, at: datetime) -> None:
+def copy_grade(session: Session, job_id: str, source_id: str, current_time: datetime) -> None:
     """Give a queued job the grade of an identical one. Raises HostError if it is not queued."""
-    values = result_cache.build_copied_values(session, source_id, job_id, at)
-    if not _apply_transition(session, COPY, (Job.id == job_id,), at, values):
+    values = result_cache.build_copied_values(session, source_id, job_id, current_time)
+    if not _apply_transition(session, COPY, (Job.id == job_id,), current_time, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
     overrides.recount_marks(session, job_id)
     outbox.emit_grade_copied(session, job_id)
 
 
-def supersede_jobs(session: Session, submissions: Select[int], by: str, at: datetime) -> None:
-    """Cancel queued jobs of these submissions in favour of the job ``by``; regrades are not cancelled."""
-    which = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
-    reason = {"error": f"superseded by {by}", "cancelled_for": CancelReason.SUPERSEDED, "superseded_by": by}
-    if _apply_transition(session, SUPERSEDE, which, at, reason):
-        outbox.emit_superseded_batches(session, submissions, at)
+def supersede_jobs(session: Session, submissions: Select[int], new_job_id: str, current_time: datetime) -> None:
+    """Cancel queued jobs of these submissions in favour of the job ``new_job_id``; regrades are not cancelled."""
+    conditions = (Job.regrade_of.is_(None), Job.submission_id.in_(submissions))
+    reason = {
+        "error": f"superseded by {new_job_id}",
+        "cancelled_for": CancelReason.SUPERSEDED,
+        "superseded_by": new_job_id,
+    }
+    if _apply_transition(session, SUPERSEDE, conditions, current_time, reason):
+        outbox.emit_superseded_batches(session, submissions, current_time)
 
 
-def put_aside_job(session: Session, job_id: str, at: datetime) -> None:
+def put_aside_job(session: Session, job_id: str, current_time: datetime) -> None:
     """Cancel a queued job that is over a limit; it is graded only if staff ask for it."""
     sentence = "over a limit: it is graded when staff ask for it"
     _apply_transition(
-        session, PUT_ASIDE, (Job.id == job_id,), at, {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT}
+        session,
+        PUT_ASIDE,
+        (Job.id == job_id,),
+        current_time,
+        {"error": sentence, "cancelled_for": CancelReason.OVER_LIMIT},
     )
 
 
-def queue_over_limit_job(session: Session, job_id: str, at: datetime) -> bool:
+def queue_over_limit_job(session: Session, job_id: str, current_time: datetime) -> bool:
     """Queue a job that was over a limit. Return whether it was."""
-    which = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
-    return _apply_transition(session, ASK_FOR, which, at, {"error": None, "cancelled_for": None}) > 0
+    conditions = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
+    return _apply_transition(session, ASK_FOR, conditions, current_time, {"error": None, "cancelled_for": None}) > 0
 
 
 @retry_conflicts
 def claim_job(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Claim the next job; None if no job is due or the worker may not claim."""
     with store.transaction() as session:
-        at = now(session)
+        current_time = now(session)
         may_claim = not needs_newer_code(session) and not workers.is_in_quarantine(session, worker)
-        job_id = find_next_job(session, at, worker) if may_claim else None
+        job_id = find_next_job(session, current_time, worker) if may_claim else None
         if job_id is None:
             return None
-        begun, most = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
-        claimed = Claim(job_id, secrets.token_hex(16), begun + 1, most, at)
+        attempts, max_attempts = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
+        claim = Claim(job_id, secrets.token_hex(16), attempts + 1, max_attempts, current_time)
         values = {
             "attempt": Job.attempt + 1,
-            "lease": claimed.lease,
-            "lease_until": at + timedelta(seconds=lease_seconds),
-            "heartbeat_at": at,
-            "started_at": at,
+            "lease": claim.lease,
+            "lease_until": current_time + timedelta(seconds=lease_seconds),
+            "heartbeat_at": current_time,
+            "started_at": current_time,
             "worker": worker,
             "process": os.getpid(),
             "progress": 0.0,
         }
-        return claimed if _apply_transition(session, CLAIM, (Job.id == job_id,), at, values) else None
+        return claim if _apply_transition(session, CLAIM, (Job.id == job_id,), current_time, values) else None
 
 
 @retry_conflicts
 def renew_lease(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
     """Renew the lease and store the progress (0 to 1). Raises Fenced if the worker no longer owns the job."""
     with store.transaction() as session:
-        at = now(session)
+        current_time = now(session)
         values = {
-            "lease_until": at + timedelta(seconds=lease_seconds),
-            "heartbeat_at": at,
+            "lease_until": current_time + timedelta(seconds=lease_seconds),
+            "heartbeat_at": current_time,
             "progress": min(1.0, max(0.0, progress)),
         }
-        _apply_owned_transition(session, HEARTBEAT, claim, at, values)
+        _apply_owned_transition(session, HEARTBEAT, claim, current_time, values)
 
 
 @retry_conflicts
 def finish_job(
     store: Store,
     claim: Claim,
-    prepared: results.PreparedGrade,
+    prepared_grade: results.PreparedGrade,
     graded_at: datetime,
     trials_at: datetime | None = None,
 ) -> None:
@@ -187,16 +195,16 @@ def finish_job(
     # Imported here, because other operations on jobs do not read recordings.
     from service.store.grades import results
 
-    grade = prepared.grade
+    grade = prepared_grade.grade
     with store.transaction() as session:
-        at = now(session)
+        current_time = now(session)
         queued_at = session.scalar(select(Job.queued_at).where(Job.id == claim.job_id))
         moments = {
             phases.QUEUED: queued_at,
             phases.CLAIMED: claim.at,
             phases.TRIALS: trials_at,
             phases.JUDGED: graded_at,
-            phases.COMMITTED: at,
+            phases.COMMITTED: current_time,
         }
         values = {
             "phases": phases.encode_times(moments),
@@ -212,11 +220,11 @@ def finish_job(
             "hints": list(grade.hints),
             "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,
-            "plots_due_at": at,
+            "plots_due_at": current_time,
         }
         _check_not_quarantined(session, claim)
-        _apply_owned_transition(session, FINISH, claim, at, values)
-        results.insert_grade(session, claim.job_id, prepared, at)
+        _apply_owned_transition(session, FINISH, claim, current_time, values)
+        results.insert_grade(session, claim.job_id, prepared_grade, current_time)
         overrides.recount_marks(session, claim.job_id)
         outbox.emit_grade_finished(session, claim.job_id)
 
@@ -236,9 +244,13 @@ def finish_job_from_cache(store: Store, claim: Claim) -> bool:
         )
         if source is None:
             return False
-        at = now(session)
+        current_time = now(session)
         _apply_owned_transition(
-            session, FINISH, claim, at, result_cache.build_copied_values(session, source, claim.job_id, at)
+            session,
+            FINISH,
+            claim,
+            current_time,
+            result_cache.build_copied_values(session, source, claim.job_id, current_time),
         )
         result_cache.copy_rows(session, source, claim.job_id)
         overrides.recount_marks(session, claim.job_id)
@@ -256,14 +268,20 @@ def fail_job(store: Store, claim: Claim, reason: str, retry: RetryPolicy) -> Job
         return apply_host_fault(session, claim, reason, retry, now(session))
 
 
-def apply_host_fault(session: Session, claim: Claim, reason: str, retry: RetryPolicy, at: datetime) -> JobState:
+def apply_host_fault(
+    session: Session, claim: Claim, reason: str, retry: RetryPolicy, current_time: datetime
+) -> JobState:
     """Handle a host fault within an open transaction, on behalf of a worker that is lost."""
     if claim.attempt >= claim.max_attempts:
         times = "once" if claim.attempt == 1 else f"{claim.attempt} times"
-        _apply_owned_transition(session, GIVE_UP, claim, at, {"error": f"Tried {times}, the last time: {reason}"})
+        _apply_owned_transition(
+            session, GIVE_UP, claim, current_time, {"error": f"Tried {times}, the last time: {reason}"}
+        )
         outbox.emit_job_ended(session, claim.job_id)
         return GIVE_UP.after
-    _apply_owned_transition(session, TRY_AGAIN, claim, at, {"error": reason, "due_at": at + retry.wait(claim.attempt)})
+    _apply_owned_transition(
+        session, TRY_AGAIN, claim, current_time, {"error": reason, "due_at": current_time + retry.wait(claim.attempt)}
+    )
     return TRY_AGAIN.after
 
 
@@ -282,86 +300,90 @@ def release_worker(store: Store, worker: str) -> int:
         return requeue_worker_jobs(session, worker, now(session))
 
 
-def requeue_worker_jobs(session: Session, worker: str, at: datetime) -> int:
+def requeue_worker_jobs(session: Session, worker: str, current_time: datetime) -> int:
     """Requeue all jobs of a worker without counting the attempt. Return their number."""
-    return _apply_transition(session, GIVE_BACK, (Job.worker == worker,), at, {"attempt": Job.attempt - 1})
+    return _apply_transition(session, GIVE_BACK, (Job.worker == worker,), current_time, {"attempt": Job.attempt - 1})
 
 
-def cancel_jobs(session: Session, batch_id: str, reason: str, at: datetime) -> int:
+def cancel_jobs(session: Session, batch_id: str, reason: str, current_time: datetime) -> int:
     """Cancel all unfinished jobs of a batch; a running job stops at its next heartbeat."""
-    ended = _apply_transition(session, CANCEL, (Job.batch_id == batch_id,), at, {"error": reason})
-    if ended:
+    cancelled_count = _apply_transition(session, CANCEL, (Job.batch_id == batch_id,), current_time, {"error": reason})
+    if cancelled_count:
         outbox.emit_batch_finished(session, batch_id)
-    return ended
+    return cancelled_count
 
 
-def retry_jobs(session: Session, which: tuple[ColumnElement[bool], ...], at: datetime) -> int:
+def retry_jobs(session: Session, conditions: tuple[ColumnElement[bool], ...], current_time: datetime) -> int:
     """Requeue the dead ones among these jobs, with all their attempts. Return their number."""
-    return _apply_transition(session, RETRY, which, at, {"attempt": 0, "error": None})
+    return _apply_transition(session, RETRY, conditions, current_time, {"attempt": 0, "error": None})
 
 
-def correct_clock(session: Session, at: datetime, longest_wait: Callable[[int], timedelta]) -> None:
-    """Correct times that are too far ahead of ``at``. Repeating the correction changes nothing.
+def correct_clock(session: Session, current_time: datetime, longest_wait: Callable[[int], timedelta]) -> None:
+    """Correct times that are too far ahead of ``current_time``. Repeating the correction changes nothing.
 
     Such times were written before the clock was set back. A clock set forward needs no correction: leases expire early
     and their workers are fenced. ``longest_wait`` returns the delay after a failed attempt. A lease keeps its length, a
     job that never failed is due now, and one that failed waits again.
     """
-    ahead = at + _TOLERANCE
-    held = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
+    latest_time = current_time + _TOLERANCE
+    held_jobs = select(Job.id, Job.lease, Job.lease_until, Job.heartbeat_at)
     for job_id, lease, lease_until, heartbeat_at in session.execute(
-        held.where(Job.state == JobState.RUNNING, Job.heartbeat_at > ahead).order_by(Job.id)
+        held_jobs.where(Job.state == JobState.RUNNING, Job.heartbeat_at > latest_time).order_by(Job.id)
     ).all():
         if lease_until is None or heartbeat_at is None:
             continue
-        renewed = at + (lease_until - heartbeat_at)
-        leased = update(Job).where(Job.id == job_id, Job.lease == lease)
-        session.execute(leased.values(heartbeat_at=at, lease_until=renewed))
-    waiting = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > ahead)
-    for job_id, attempt, due_at in session.execute(waiting.order_by(Job.id)).all():
-        latest = at + longest_wait(attempt) if attempt else at
-        if due_at > latest + _TOLERANCE:
-            held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
-            session.execute(update(Job).where(*held_back).values(due_at=latest, notified_at=None))
-    notified = (Job.state == JobState.QUEUED, Job.notified_at > ahead)
-    session.execute(update(Job).where(match_and_lock_jobs(*notified), *notified).values(notified_at=None))
-    plots.correct_due_times(session, at, ahead)
+        new_lease_end = current_time + (lease_until - heartbeat_at)
+        lease_statement = update(Job).where(Job.id == job_id, Job.lease == lease)
+        session.execute(lease_statement.values(heartbeat_at=current_time, lease_until=new_lease_end))
+    queued_jobs = select(Job.id, Job.attempt, Job.due_at).where(Job.state == JobState.QUEUED, Job.due_at > latest_time)
+    for job_id, attempt, due_at in session.execute(queued_jobs.order_by(Job.id)).all():
+        latest_due = current_time + longest_wait(attempt) if attempt else current_time
+        if due_at > latest_due + _TOLERANCE:
+            is_held_back = (Job.id == job_id, Job.state == JobState.QUEUED)
+            session.execute(update(Job).where(*is_held_back).values(due_at=latest_due, notified_at=None))
+    is_notified_later = (Job.state == JobState.QUEUED, Job.notified_at > latest_time)
+    session.execute(
+        update(Job).where(match_and_lock_jobs(*is_notified_later), *is_notified_later).values(notified_at=None)
+    )
+    plots.correct_due_times(session, current_time, latest_time)
 
 
-def _build_state_columns(state: JobState, at: datetime) -> dict[str, Any]:
+def _build_state_columns(state: JobState, current_time: datetime) -> dict[str, Any]:
     """Return the columns that every transition into a state sets."""
     match state:
         case JobState.QUEUED:
-            waiting = {"progress": 0.0, "due_at": at, "notified_at": None, "finished_at": None}
-            return {"lease": None, "lease_until": None} | waiting
+            queue_columns = {"progress": 0.0, "due_at": current_time, "notified_at": None, "finished_at": None}
+            return {"lease": None, "lease_until": None} | queue_columns
         case JobState.RUNNING:
             return {}
         case JobState.DONE:
-            return {"lease": None, "lease_until": None, "finished_at": at, "progress": 1.0, "error": None}
+            return {"lease": None, "lease_until": None, "finished_at": current_time, "progress": 1.0, "error": None}
         case JobState.DEAD | JobState.CANCELLED:
-            return {"lease": None, "lease_until": None, "finished_at": at}
+            return {"lease": None, "lease_until": None, "finished_at": current_time}
 
 
 def _apply_transition(
     session: Session,
     transition: Transition,
-    which: tuple[ColumnElement[bool], ...],
-    at: datetime,
+    conditions: tuple[ColumnElement[bool], ...],
+    current_time: datetime,
     values: dict[str, Any],
 ) -> int:
     """Apply the transition to those of these jobs that are in a valid state before it. Return their number."""
-    columns = {"state": transition.after} | _build_state_columns(transition.after, at) | values
-    which = (*which, Job.state.in_(transition.before))
-    statement = update(Job).where(match_and_lock_jobs(*which), *which).values(**columns)
+    columns = {"state": transition.after} | _build_state_columns(transition.after, current_time) | values
+    conditions = (*conditions, Job.state.in_(transition.before))
+    statement = update(Job).where(match_and_lock_jobs(*conditions), *conditions).values(**columns)
     options = {"synchronize_session": False}
     return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
 
 
 def _apply_owned_transition(
-    session: Session, transition: Transition, claim: Claim, at: datetime, values: dict[str, Any]
+    session: Session, transition: Transition, claim: Claim, current_time: datetime, values: dict[str, Any]
 ) -> None:
     """Apply the transition to an owned job. Raises Fenced if the worker no longer owns it."""
-    if not _apply_transition(session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), at, values):
+    if not _apply_transition(
+        session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), current_time, values
+    ):
         state = session.scalar(select(Job.state).where(Job.id == claim.job_id))
         if state is None:
             raise HostError(f"The job {claim.job_id} is gone from the database")
@@ -369,7 +391,7 @@ def _apply_owned_transition(
 
 
 def _check_not_quarantined(session: Session, claim: Claim) -> None:
-    held = (Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING)
-    worker = session.scalar(select(Job.worker).where(*held))
+    is_owned = (Job.id == claim.job_id, Job.lease == claim.lease, Job.state == JobState.RUNNING)
+    worker = session.scalar(select(Job.worker).where(*is_owned))
     if worker is not None and workers.is_in_quarantine(session, worker, lock=True):
         raise LeaseLost(f"The job {claim.job_id} is no longer this worker's: the worker is in quarantine")

@@ -64,55 +64,61 @@ def collect_service_metrics(session: Session) -> ServiceMetrics:
     """Collect all metrics."""
     verdicts = select(Job.verdict, func.count()).where(Job.verdict.is_not(None)).group_by(Job.verdict)
     # The last attempt of a graded or running job is not a fault.
-    good = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
+    successful_attempts = case((Job.state.in_((JobState.DONE, JobState.RUNNING)), 1), else_=0)
     plots = select(Job.plots, func.count()).where(Job.plots != PlotState.NONE).group_by(Job.plots)
     counts = (
-        select(func.sum(Job.attempt - good)).where(Job.attempt > 0),
+        select(func.sum(Job.attempt - successful_attempts)).where(Job.attempt > 0),
         select(func.count()).select_from(CriterionResultRow).where(CriterionResultRow.unjudged.is_not(None)),
         select(func.count()).select_from(TrialRow).where(TrialRow.surprise.is_not(None)),
         select(func.count()).select_from(Batch).where(Batch.state == BatchState.PAUSED),
         select(func.count()).select_from(Worker).where(Worker.quarantined_at.is_not(None)),
     )
-    faults, unjudged, surprises, paused, quarantined = session.execute(
+    fault_count, unjudged_count, surprise_count, paused_count, quarantined_count = session.execute(
         select(*(count.scalar_subquery() for count in counts))
     ).one()
     return ServiceMetrics(
         queue=collect_queue_metrics(session),
         verdicts={verdict: count for verdict, count in session.execute(verdicts) if verdict is not None},
-        host_faults=faults or 0,
-        unjudged=unjudged,
-        surprises=surprises,
+        host_faults=fault_count or 0,
+        unjudged=unjudged_count,
+        surprises=surprise_count,
         plots=dict(session.execute(plots).all()),
-        paused_batches=paused,
-        quarantined=quarantined,
+        paused_batches=paused_count,
+        quarantined=quarantined_count,
         times=_load_times(session),
     )
 
 
 def collect_queue_metrics(session: Session) -> QueueMetrics:
     """Collect only the metrics that show whether the queue is stuck."""
-    at = now(session)
-    by_state = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
-    waiting = (
-        select(Job.lane, func.count(), func.min(Job.queued_at)).where(*match_claimable_jobs(at)).group_by(Job.lane)
+    current_time = now(session)
+    state_counts = select(Job.lane, Job.state, func.count()).group_by(Job.lane, Job.state)
+    claimable_query = (
+        select(Job.lane, func.count(), func.min(Job.queued_at))
+        .where(*match_claimable_jobs(current_time))
+        .group_by(Job.lane)
     )
-    rows = session.execute(waiting).all()
-    seen = workers.load_workers(session)
+    rows = session.execute(claimable_query).all()
+    worker_lines = workers.load_workers(session)
     return QueueMetrics(
-        jobs={(lane, state): count for lane, state, count in session.execute(by_state)},
+        jobs={(lane, state): count for lane, state, count in session.execute(state_counts)},
         claimable={lane: count for lane, count, _ in rows},
-        oldest_seconds={lane: max(0.0, (at - oldest).total_seconds()) for lane, _, oldest in rows},
-        idle_seconds=_measure_idle_seconds(session, at),
-        workers=seen,
-        silent_seconds={each.worker.name: max(0.0, (at - each.seen_at).total_seconds()) for each in seen},
+        oldest_seconds={lane: max(0.0, (current_time - oldest).total_seconds()) for lane, _, oldest in rows},
+        idle_seconds=_measure_idle_seconds(session, current_time),
+        workers=worker_lines,
+        silent_seconds={
+            each.worker.name: max(0.0, (current_time - each.seen_at).total_seconds()) for each in worker_lines
+        },
     )
 
 
-def _measure_idle_seconds(session: Session, at: datetime) -> float:
-    lately = Job.started_at > at - _RECENT_PERIOD
-    begun, ended = session.execute(select(func.max(Job.started_at), func.max(Job.finished_at)).where(lately)).one()
-    moments = [moment for moment in (begun, ended) if moment is not None]
-    return max(0.0, (at - max(moments)).total_seconds()) if moments else math.inf
+def _measure_idle_seconds(session: Session, current_time: datetime) -> float:
+    is_recent = Job.started_at > current_time - _RECENT_PERIOD
+    last_start, last_finish = session.execute(
+        select(func.max(Job.started_at), func.max(Job.finished_at)).where(is_recent)
+    ).one()
+    moments = [moment for moment in (last_start, last_finish) if moment is not None]
+    return max(0.0, (current_time - max(moments)).total_seconds()) if moments else math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +131,8 @@ class Pace:
 
 def estimate_pace(session: Session, batch_id: str) -> Pace | None:
     """Estimate the pace from the last minutes; None if nothing ended then, or nothing remains."""
-    at = now(session)
-    unfinished = (
+    current_time = now(session)
+    unfinished_query = (
         select(Enrolment.course_id, Job.batch_id, func.count())
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .outerjoin(Batch, Job.batch_id == Batch.id)
@@ -136,32 +142,36 @@ def estimate_pace(session: Session, batch_id: str) -> Pace | None:
         )
         .group_by(Enrolment.course_id, Job.batch_id)
     )
-    waiting: dict[int, dict[str | None, int]] = defaultdict(dict)
-    for course, batch, count in session.execute(unfinished).all():
-        waiting[course][batch] = count
-    of_batch = func.sum(case((Job.batch_id == batch_id, 1), else_=0))
+    unfinished_jobs: dict[int, dict[str | None, int]] = defaultdict(dict)
+    for course, batch, count in session.execute(unfinished_query).all():
+        unfinished_jobs[course][batch] = count
+    batch_count = func.sum(case((Job.batch_id == batch_id, 1), else_=0))
     # The start time is indexed.
-    ended = (Job.state == JobState.DONE, Job.finished_at > at - PACE_WINDOW, Job.started_at > at - _RECENT_PERIOD)
-    own, everybody, first = session.execute(
-        select(of_batch, func.count(), func.min(Job.started_at)).where(*ended)
+    is_recently_done = (
+        Job.state == JobState.DONE,
+        Job.finished_at > current_time - PACE_WINDOW,
+        Job.started_at > current_time - _RECENT_PERIOD,
+    )
+    batch_done, total_done, first_start = session.execute(
+        select(batch_count, func.count(), func.min(Job.started_at)).where(*is_recently_done)
     ).one()
-    before = _count_jobs_before_end(waiting, batch_id)
-    if not before or not own or first is None:
+    jobs_before_end = _count_jobs_before_end(unfinished_jobs, batch_id)
+    if not jobs_before_end or not batch_done or first_start is None:
         return None
-    seconds = max(1.0, min((at - first).total_seconds(), PACE_WINDOW.total_seconds()))
-    return Pace(60 * own / seconds, timedelta(seconds=round(before * seconds / everybody)))
+    seconds = max(1.0, min((current_time - first_start).total_seconds(), PACE_WINDOW.total_seconds()))
+    return Pace(60 * batch_done / seconds, timedelta(seconds=round(jobs_before_end * seconds / total_done)))
 
 
-def _count_jobs_before_end(waiting: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
+def _count_jobs_before_end(unfinished_jobs: Mapping[int, Mapping[str | None, int]], batch_id: str) -> int:
     """Return the number of jobs, in all courses, that end before the batch does.
 
     Courses share the workers equally, and so do the batches of a course.
     """
-    course = next((course for course, batches in waiting.items() if batch_id in batches), None)
+    course = next((course for course, batches in unfinished_jobs.items() if batch_id in batches), None)
     if course is None:
         return 0
-    of_course = sum(min(count, waiting[course][batch_id]) for count in waiting[course].values())
-    return sum(min(sum(batches.values()), of_course) for batches in waiting.values())
+    course_share = sum(min(count, unfinished_jobs[course][batch_id]) for count in unfinished_jobs[course].values())
+    return sum(min(sum(batches.values()), course_share) for batches in unfinished_jobs.values())
 
 
 def compute_quantile(values: Sequence[float], share: float) -> float:
@@ -170,15 +180,15 @@ def compute_quantile(values: Sequence[float], share: float) -> float:
 
 
 def _load_times(session: Session) -> dict[str, list[float]]:
-    recent = (
+    recent_phases = (
         select(Job.phases)
         .where(Job.finished_at > now(session) - TIMES_WINDOW, Job.state == JobState.DONE)
         .order_by(Job.finished_at.desc())
         .limit(MOST_TIMES)
     )
     times: dict[str, list[float]] = {span: [] for span in phases.SPANS}
-    for stored in session.scalars(recent):
-        for span, duration in phases.compute_durations(stored).items():
+    for phase_times in session.scalars(recent_phases):
+        for span, duration in phases.compute_durations(phase_times).items():
             # A clock that was set back can give negative durations, which count as 0.
             times[span].append(max(0.0, duration.total_seconds()))
     return {span: sorted(found) for span, found in times.items()}

@@ -45,55 +45,61 @@ def estimate_place(session: Session, job_id: str) -> QueuePlace:
 
 def estimate_places(session: Session, job_ids: Collection[str]) -> dict[str, QueuePlace]:
     """Return the places of several jobs, with the same number of statements."""
-    at = now(session)
+    current_time = now(session)
     jobs = session.scalars(select(Job).where(Job.id.in_(job_ids))).all()
-    lively = [seen.worker for seen in workers.load_workers(session) if seen.lately]
-    slots = sum(worker.concurrency for worker in lively)
-    before, each = _count_jobs_before(session, job_ids, at), _measure_usual_seconds(session)
+    live_workers = [seen.worker for seen in workers.load_workers(session) if seen.lately]
+    slots = sum(worker.concurrency for worker in live_workers)
+    jobs_before, job_seconds = _count_jobs_before(session, job_ids, current_time), _measure_usual_seconds(session)
     places = {}
     for job in jobs:
-        ahead = before[job.id] if job.state is JobState.QUEUED else 0
-        if each is None or not lively:
-            places[job.id] = QueuePlace(ahead, None, len(lively))
+        job_count = jobs_before[job.id] if job.state is JobState.QUEUED else 0
+        if job_seconds is None or not live_workers:
+            places[job.id] = QueuePlace(job_count, None, len(live_workers))
             continue
-        running = (at - job.started_at).total_seconds() if job.state is JobState.RUNNING and job.started_at else 0.0
-        progress = min(running / each, _MOST_PROGRESS) if each else 0.0
-        places[job.id] = QueuePlace(ahead, ahead * each / slots + each * (1 - progress), len(lively), progress)
+        elapsed_seconds = (
+            (current_time - job.started_at).total_seconds() if job.state is JobState.RUNNING and job.started_at else 0.0
+        )
+        progress = min(elapsed_seconds / job_seconds, _MOST_PROGRESS) if job_seconds else 0.0
+        places[job.id] = QueuePlace(
+            job_count, job_count * job_seconds / slots + job_seconds * (1 - progress), len(live_workers), progress
+        )
     return places
 
 
-def _count_jobs_before(session: Session, job_ids: Collection[str], at: datetime) -> dict[str, int]:
+def _count_jobs_before(session: Session, job_ids: Collection[str], current_time: datetime) -> dict[str, int]:
     """Return the number of claimable jobs ahead of each of these jobs, by id."""
-    recent = select_recent_jobs(at).cte("recent")
-    of_course = select_shares(recent.c.course_id)
-    of_batch, of_student = select_shares(recent.c.batch_id), select_shares(recent.c.enrolment_id)
+    recent_jobs = select_recent_jobs(current_time).cte("recent")
+    course_shares = select_shares(recent_jobs.c.course_id)
+    batch_shares, student_shares = select_shares(recent_jobs.c.batch_id), select_shares(recent_jobs.c.enrolment_id)
     order = (
         Job.lane == JobQueue.BATCH,
-        func.coalesce(of_course.c.begun, 0),
-        func.coalesce(of_batch.c.begun, 0),
-        func.coalesce(of_student.c.begun, 0),
+        func.coalesce(course_shares.c.begun, 0),
+        func.coalesce(batch_shares.c.begun, 0),
+        func.coalesce(student_shares.c.begun, 0),
         Job.queued_at,
         Job.id,
     )
-    can_be_claimed, mine = and_(*match_claimable_jobs(at)), Job.id.in_(job_ids)
-    earlier = func.sum(case((can_be_claimed, 1), else_=0)).over(order_by=order, rows=(None, -1))
-    ranked = (
-        select(Job.id, earlier.label("earlier"))
+    can_be_claimed, is_selected = and_(*match_claimable_jobs(current_time)), Job.id.in_(job_ids)
+    claimable_before = func.sum(case((can_be_claimed, 1), else_=0)).over(order_by=order, rows=(None, -1))
+    ranked_jobs = (
+        select(Job.id, claimable_before.label("earlier"))
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .outerjoin(of_course, of_course.c.share == Enrolment.course_id)
-        .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
-        .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
-        .where(or_(can_be_claimed, mine))
+        .outerjoin(course_shares, course_shares.c.share == Enrolment.course_id)
+        .outerjoin(batch_shares, batch_shares.c.share == Job.batch_id)
+        .outerjoin(student_shares, student_shares.c.share == Job.enrolment_id)
+        .where(or_(can_be_claimed, is_selected))
         .subquery()
     )
-    query = select(ranked.c.id, func.coalesce(ranked.c.earlier, 0)).where(ranked.c.id.in_(job_ids))
+    query = select(ranked_jobs.c.id, func.coalesce(ranked_jobs.c.earlier, 0)).where(ranked_jobs.c.id.in_(job_ids))
     return dict(session.execute(query).all())
 
 
 def _measure_usual_seconds(session: Session) -> float | None:
-    run = (Job.state == JobState.DONE, Job.copied_from.is_(None), Job.started_at.is_not(None))
-    query = select(Job.started_at, Job.finished_at).where(*run).order_by(Job.started_at.desc()).limit(_MOST_MEASURED)
-    taken = [
+    was_graded = (Job.state == JobState.DONE, Job.copied_from.is_(None), Job.started_at.is_not(None))
+    query = (
+        select(Job.started_at, Job.finished_at).where(*was_graded).order_by(Job.started_at.desc()).limit(_MOST_MEASURED)
+    )
+    durations = [
         (finished - started).total_seconds() for started, finished in session.execute(query) if started and finished
     ]
-    return sum(taken) / len(taken) if taken else None
+    return sum(durations) / len(durations) if durations else None

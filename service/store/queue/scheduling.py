@@ -22,53 +22,53 @@ BATCH_EVERY = 5
 RESERVED_PERIOD = timedelta(seconds=20)
 
 
-def match_claimable_jobs(at: datetime) -> tuple[ColumnElement[bool], ...]:
+def match_claimable_jobs(current_time: datetime) -> tuple[ColumnElement[bool], ...]:
     """Return the conditions for a claimable job: it is queued and due, and its batch is open."""
-    held_back = select(Batch.id).where(Batch.state != BatchState.OPEN)
+    closed_batches = select(Batch.id).where(Batch.state != BatchState.OPEN)
     return (
         Job.state == JobState.QUEUED,
-        Job.due_at <= at,
-        or_(Job.batch_id.is_(None), Job.batch_id.not_in(held_back)),
+        Job.due_at <= current_time,
+        or_(Job.batch_id.is_(None), Job.batch_id.not_in(closed_batches)),
     )
 
 
-def select_recent_jobs(at: datetime) -> Select[JobQueue, int, str | None, int]:
+def select_recent_jobs(current_time: datetime) -> Select[JobQueue, int, str | None, int]:
     """Return a query for the queue, course, batch and student of every job that counts towards a share."""
     return (
         select(Job.lane, Enrolment.course_id, Job.batch_id, Job.enrolment_id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .where(Job.started_at > at - SHARE_WINDOW)
+        .where(Job.started_at > current_time - SHARE_WINDOW)
     )
 
 
-def find_next_job(session: Session, at: datetime, worker: str) -> str | None:
+def find_next_job(session: Session, current_time: datetime, worker: str) -> str | None:
     """Return the id of the job that ``worker`` should claim next; None if no job is due.
 
     Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest jobs started in
     the last minute comes first, then the batch, then the student, then the oldest job.
     """
     # A common table expression; without it SQLite would scan all jobs to count each share.
-    recent = select_recent_jobs(at).cte("recent")
-    counted = session.execute(select(recent.c.lane, func.count()).group_by(recent.c.lane))
-    by_lane: dict[JobQueue, int] = dict(counted.all())
-    people, batches = by_lane.get(JobQueue.INTERACTIVE, 0), by_lane.get(JobQueue.BATCH, 0)
-    first = JobQueue.BATCH if people >= (BATCH_EVERY - 1) * (batches + 1) else JobQueue.INTERACTIVE
+    recent_jobs = select_recent_jobs(current_time).cte("recent")
+    lane_counts = session.execute(select(recent_jobs.c.lane, func.count()).group_by(recent_jobs.c.lane))
+    jobs_by_lane: dict[JobQueue, int] = dict(lane_counts.all())
+    interactive_jobs, batch_jobs = jobs_by_lane.get(JobQueue.INTERACTIVE, 0), jobs_by_lane.get(JobQueue.BATCH, 0)
+    first_lane = JobQueue.BATCH if interactive_jobs >= (BATCH_EVERY - 1) * (batch_jobs + 1) else JobQueue.INTERACTIVE
 
-    of_course = select_shares(recent.c.course_id)
-    of_batch = select_shares(recent.c.batch_id)
-    of_student = select_shares(recent.c.enrolment_id)
+    course_shares = select_shares(recent_jobs.c.course_id)
+    batch_shares = select_shares(recent_jobs.c.batch_id)
+    student_shares = select_shares(recent_jobs.c.enrolment_id)
     query = (
         select(Job.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .outerjoin(of_course, of_course.c.share == Enrolment.course_id)
-        .outerjoin(of_batch, of_batch.c.share == Job.batch_id)
-        .outerjoin(of_student, of_student.c.share == Job.enrolment_id)
-        .where(*match_claimable_jobs(at), not_(_match_better_elsewhere(worker, at)))
+        .outerjoin(course_shares, course_shares.c.share == Enrolment.course_id)
+        .outerjoin(batch_shares, batch_shares.c.share == Job.batch_id)
+        .outerjoin(student_shares, student_shares.c.share == Job.enrolment_id)
+        .where(*match_claimable_jobs(current_time), not_(_match_better_elsewhere(worker, current_time)))
         .order_by(
-            case((Job.lane == first, 0), else_=1),
-            func.coalesce(of_course.c.begun, 0),
-            func.coalesce(of_batch.c.begun, 0),
-            func.coalesce(of_student.c.begun, 0),
+            case((Job.lane == first_lane, 0), else_=1),
+            func.coalesce(course_shares.c.begun, 0),
+            func.coalesce(batch_shares.c.begun, 0),
+            func.coalesce(student_shares.c.begun, 0),
             Job.queued_at,
             Job.id,
         )
@@ -78,11 +78,13 @@ def find_next_job(session: Session, at: datetime, worker: str) -> str | None:
     return session.scalar(query)
 
 
-def _match_better_elsewhere(worker: str, at: datetime) -> ColumnElement[bool]:
+def _match_better_elsewhere(worker: str, current_time: datetime) -> ColumnElement[bool]:
     """Return the condition that a job failed with a host fault on this worker and another worker could try it."""
     # A stopped worker returns its jobs without a fault, and then no error is stored.
-    failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
-    return and_(failed_here, Job.due_at > at - RESERVED_PERIOD, match_other_live_worker(worker, at))
+    has_failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
+    return and_(
+        has_failed_here, Job.due_at > current_time - RESERVED_PERIOD, match_other_live_worker(worker, current_time)
+    )
 
 
 def select_shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:

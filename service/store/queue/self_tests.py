@@ -38,14 +38,14 @@ class QuarantineEffects:
 def record_pass(store: Store, worker: str, process: int) -> None:
     """Record that this process of the worker passed the self-test now."""
     with store.transaction() as session:
-        at = now(session)
-        _lock_worker(session, worker, at).self_tested_at = at
+        current_time = now(session)
+        _lock_worker(session, worker, current_time).self_tested_at = current_time
         query = select(SelfTest).where(SelfTest.worker == worker, SelfTest.process == process)
         row = session.scalar(query)
         if row is None:
-            session.add(SelfTest(worker=worker, process=process, right_at=at))
+            session.add(SelfTest(worker=worker, process=process, right_at=current_time))
         else:
-            row.right_at = at
+            row.right_at = current_time
 
 
 @retry_conflicts
@@ -56,79 +56,90 @@ def quarantine_worker(store: Store, worker: str, reason: str) -> QuarantineEffec
     suspect and no longer published. Does nothing for a worker that is already in quarantine.
     """
     with store.transaction() as session:
-        at = now(session)
-        row = _lock_worker(session, worker, at)
+        current_time = now(session)
+        row = _lock_worker(session, worker, current_time)
         if row.quarantined_at is not None:
             return QuarantineEffects(0, (), ())
-        row.self_tested_at = row.quarantined_at = at
+        row.self_tested_at = row.quarantined_at = current_time
         row.reason = reason
         # A concurrent finish waits for this row, or is already committed and visible below.
         session.flush()
-        taken_back = jobs.requeue_worker_jobs(session, worker, at)
+        requeued_count = jobs.requeue_worker_jobs(session, worker, current_time)
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
-        suspects = _load_suspects(session, worker)
-        reruns = [_build_rerun(session, job) for job in suspects if job.standing is not Standing.KEPT]
-        for job in suspects:
+        suspect_jobs = _load_suspects(session, worker)
+        reruns = [_build_rerun(session, job) for job in suspect_jobs if job.standing is not Standing.KEPT]
+        for job in suspect_jobs:
             job.suspect, job.standing = sentence, Standing.KEPT
             job.published_at = job.published_by = None
         session.flush()
-        again = tuple(jobs.enqueue(session, job, at) for job in reruns)
-        ids = tuple(job.id for job in suspects)
+        rerun_ids = tuple(jobs.enqueue(session, job, current_time) for job in reruns)
+        suspect_ids = tuple(job.id for job in suspect_jobs)
         audit.record_action(
-            session, worker, "quarantine", "worker", worker, reason=reason, suspect=list(ids), again=list(again)
+            session,
+            worker,
+            "quarantine",
+            "worker",
+            worker,
+            reason=reason,
+            suspect=list(suspect_ids),
+            again=list(rerun_ids),
         )
-        return QuarantineEffects(taken_back, ids, again)
+        return QuarantineEffects(requeued_count, suspect_ids, rerun_ids)
 
 
-def _lock_worker(session: Session, name: str, at: datetime) -> Worker:
+def _lock_worker(session: Session, name: str, current_time: datetime) -> Worker:
     """Return the worker's row, locked, creating it if necessary."""
     row = session.scalar(select(Worker).where(Worker.name == name).with_for_update(key_share=True))
     if row is None:
-        _delete_old(session, at)
+        _delete_old(session, current_time)
         row = Worker(
-            name=name, grader_version=GRADER_VERSION, grader_sha256=hash_grader(), first_at=at, self_tested_at=at
+            name=name,
+            grader_version=GRADER_VERSION,
+            grader_sha256=hash_grader(),
+            first_at=current_time,
+            self_tested_at=current_time,
         )
         session.add(row)
         session.flush()
     return row
 
 
-def _delete_old(session: Session, at: datetime) -> None:
-    old = select(Worker.name).where(Worker.self_tested_at < at - _RETENTION)
+def _delete_old(session: Session, current_time: datetime) -> None:
+    old_workers = select(Worker.name).where(Worker.self_tested_at < current_time - _RETENTION)
     for statement in (
-        delete(SelfTest).where(SelfTest.worker.in_(old)),
-        delete(Worker).where(Worker.name.in_(old)),
+        delete(SelfTest).where(SelfTest.worker.in_(old_workers)),
+        delete(Worker).where(Worker.name.in_(old_workers)),
     ):
         session.execute(statement, execution_options={"synchronize_session": False})
 
 
 def _load_suspects(session: Session, worker: str) -> Sequence[Job]:
     """Return the grades of the worker since its last passed self-test, with all their copies."""
-    last = (
+    last_pass = (
         select(SelfTest.right_at)
         .where(SelfTest.worker == worker, SelfTest.process == Job.process)
         .correlate(Job)
         .scalar_subquery()
     )
-    graded = (Job.worker == worker, *current_grades.IS_TRUSTED, Job.copied_from.is_(None))
-    own = select(Job.id).where(*graded, or_(last.is_(None), Job.finished_at > last))
-    ids = session.scalars(own).all()
-    which = or_(Job.id.in_(ids), Job.copied_from.in_(ids))
-    lock_submissions(session, SubmissionRow.id.in_(select(Job.submission_id).where(which)))
-    lock_jobs(session, which)
-    query = select(Job).where(which).order_by(Job.queued_at, Job.id)
+    is_graded = (Job.worker == worker, *current_grades.IS_TRUSTED, Job.copied_from.is_(None))
+    own_grades = select(Job.id).where(*is_graded, or_(last_pass.is_(None), Job.finished_at > last_pass))
+    own_ids = session.scalars(own_grades).all()
+    is_suspect = or_(Job.id.in_(own_ids), Job.copied_from.in_(own_ids))
+    lock_submissions(session, SubmissionRow.id.in_(select(Job.submission_id).where(is_suspect)))
+    lock_jobs(session, is_suspect)
+    query = select(Job).where(is_suspect).order_by(Job.queued_at, Job.id)
     return session.scalars(query.execution_options(populate_existing=True)).all()
 
 
 def _build_rerun(session: Session, job: Job) -> Job:
     """Create, without queueing, a new job that replaces a suspect one."""
-    cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
+    is_cancelled = job.batch_id is not None and session.get_one(Batch, job.batch_id).state is BatchState.CANCELLED
     return Job(
         submission_id=job.submission_id,
         assignment_version_id=job.assignment_version_id,
         enrolment_id=job.enrolment_id,
         # Jobs of a cancelled batch never start, but this one was graded before.
-        batch_id=None if cancelled else job.batch_id,
+        batch_id=None if is_cancelled else job.batch_id,
         lane=JobQueue(job.lane),
         max_attempts=job.max_attempts,
         regrade_of=job.id,

@@ -64,21 +64,24 @@ class StudentTestRun:
         return self.state.value in _UNFINISHED
 
 
-def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed: bytes) -> str:
+def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_submission: bytes) -> str:
     """Queue a program for a test run and return its id.
 
     Raises UsageError if the student has an unfinished one, or too many within an hour.
     """
     # Serialises concurrent requests, so that the second one finds the first.
     session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
-    at = now(session)
-    of_student = Tryout.enrolment_id == enrolment_id
-    session.execute(delete(Tryout).where(Tryout.queued_at < at - _RETENTION, Tryout.state.not_in(_UNFINISHED)))
-    if session.scalar(select(func.count()).where(of_student, Tryout.state.in_(_UNFINISHED))):
+    current_time = now(session)
+    is_by_student = Tryout.enrolment_id == enrolment_id
+    session.execute(
+        delete(Tryout).where(Tryout.queued_at < current_time - _RETENTION, Tryout.state.not_in(_UNFINISHED))
+    )
+    if session.scalar(select(func.count()).where(is_by_student, Tryout.state.in_(_UNFINISHED))):
         raise UsageError("your previous test run is not completed yet; wait for it before you start another one.")
-    if (session.scalar(select(func.count()).where(of_student, Tryout.queued_at > at - timedelta(hours=1))) or 0) >= (
-        MOST_AN_HOUR
-    ):
+    if (
+        session.scalar(select(func.count()).where(is_by_student, Tryout.queued_at > current_time - timedelta(hours=1)))
+        or 0
+    ) >= (MOST_AN_HOUR):
         raise UsageError(
             "%(count)s test runs within an hour is the limit; wait a few minutes, or submit your files.",
             count=MOST_AN_HOUR,
@@ -87,9 +90,9 @@ def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed:
     row = Tryout(
         enrolment_id=enrolment_id,
         assignment_version_id=version_id,
-        packed=packed,
+        packed=packed_submission,
         state=RunState.QUEUED.value,
-        queued_at=at,
+        queued_at=current_time,
     )
     session.add(row)
     session.flush()
@@ -100,8 +103,8 @@ def _delete_programs(session: Session, enrolment_id: int, version_id: int) -> No
     """Remove the programs of a student's earlier test runs of the assignment; their results are kept for a day."""
     assignment = select(AssignmentVersion.assignment).where(AssignmentVersion.id == version_id).scalar_subquery()
     versions = select(AssignmentVersion.id).where(AssignmentVersion.assignment == assignment)
-    tried = (Tryout.enrolment_id == enrolment_id, Tryout.assignment_version_id.in_(versions))
-    session.execute(update(Tryout).where(*tried, Tryout.state.not_in(_UNFINISHED)).values(packed=b""))
+    is_earlier_run = (Tryout.enrolment_id == enrolment_id, Tryout.assignment_version_id.in_(versions))
+    session.execute(update(Tryout).where(*is_earlier_run, Tryout.state.not_in(_UNFINISHED)).values(packed=b""))
 
 
 @retry_conflicts
@@ -110,43 +113,50 @@ def claim_test_run(store: Store, lease_seconds: float) -> ClaimedTestRun | None:
     with store.transaction() as session:
         if needs_newer_code(session):
             return None
-        at = now(session)
-        given_up = update(Tryout).where(_match_due(at), Tryout.attempt >= MOST_ATTEMPTS)
-        session.execute(given_up.values(state=RunState.FAILED.value, error=_SILENT_WORKER, finished_at=at))
-        query = select(Tryout.id, Tryout.attempt).where(_match_due(at)).order_by(Tryout.queued_at, Tryout.id).limit(1)
-        found = session.execute(query.with_for_update(skip_locked=True, key_share=True)).one_or_none()
-        if found is None:
+        current_time = now(session)
+        abandon_statement = update(Tryout).where(_match_due(current_time), Tryout.attempt >= MOST_ATTEMPTS)
+        session.execute(
+            abandon_statement.values(state=RunState.FAILED.value, error=_SILENT_WORKER, finished_at=current_time)
+        )
+        query = (
+            select(Tryout.id, Tryout.attempt)
+            .where(_match_due(current_time))
+            .order_by(Tryout.queued_at, Tryout.id)
+            .limit(1)
+        )
+        run_row = session.execute(query.with_for_update(skip_locked=True, key_share=True)).one_or_none()
+        if run_row is None:
             return None
-        claimed = ClaimedTestRun(found.id, found.attempt + 1)
-        lease = {"lease_until": at + timedelta(seconds=lease_seconds), "attempt": claimed.attempt}
-        taken = update(Tryout).where(Tryout.id == found.id)
-        session.execute(taken.values(state=RunState.RUNNING.value, **lease))
-        return claimed
+        test_run = ClaimedTestRun(run_row.id, run_row.attempt + 1)
+        lease = {"lease_until": current_time + timedelta(seconds=lease_seconds), "attempt": test_run.attempt}
+        statement = update(Tryout).where(Tryout.id == run_row.id)
+        session.execute(statement.values(state=RunState.RUNNING.value, **lease))
+        return test_run
 
 
 @retry_conflicts
-def renew_lease(store: Store, claimed: ClaimedTestRun, lease_seconds: float) -> bool:
+def renew_lease(store: Store, test_run: ClaimedTestRun, lease_seconds: float) -> bool:
     """Renew the lease. Return False if another worker owns the test run."""
     with store.transaction() as session:
-        return _update_owned(session, claimed, lease_until=now(session) + timedelta(seconds=lease_seconds))
+        return _update_owned(session, test_run, lease_until=now(session) + timedelta(seconds=lease_seconds))
 
 
 @retry_conflicts
-def finish_test_run(store: Store, claimed: ClaimedTestRun, words: dict[str, Any], replay: bytes | None) -> bool:
+def finish_test_run(store: Store, test_run: ClaimedTestRun, words: dict[str, Any], replay: bytes | None) -> bool:
     """Store the result. Return False if another worker owns the test run."""
     with store.transaction() as session:
-        done = {"state": RunState.DONE.value, "finished_at": now(session), "lease_until": None}
-        return _update_owned(session, claimed, words=words, replay=replay, error=None, **done)
+        result_columns = {"state": RunState.DONE.value, "finished_at": now(session), "lease_until": None}
+        return _update_owned(session, test_run, words=words, replay=replay, error=None, **result_columns)
 
 
 @retry_conflicts
-def fail_test_run(store: Store, claimed: ClaimedTestRun, sentence: str) -> bool:
+def fail_test_run(store: Store, test_run: ClaimedTestRun, sentence: str) -> bool:
     """Handle a host fault: the test run is queued for its second attempt, or has failed."""
     with store.transaction() as session:
-        if claimed.attempt < MOST_ATTEMPTS:
-            return _update_owned(session, claimed, state=RunState.QUEUED.value, lease_until=None, error=sentence)
-        failed = {"state": RunState.FAILED.value, "finished_at": now(session), "lease_until": None}
-        return _update_owned(session, claimed, error=sentence, **failed)
+        if test_run.attempt < MOST_ATTEMPTS:
+            return _update_owned(session, test_run, state=RunState.QUEUED.value, lease_until=None, error=sentence)
+        result_columns = {"state": RunState.FAILED.value, "finished_at": now(session), "lease_until": None}
+        return _update_owned(session, test_run, error=sentence, **result_columns)
 
 
 def count_due_runs(store: Store) -> int:
@@ -157,10 +167,18 @@ def count_due_runs(store: Store) -> int:
 
 def measure_queue(session: Session) -> QueuedTestRuns:
     """Return the load of the test run queue."""
-    waits, runs = (Tryout.state == each.value for each in (RunState.QUEUED, RunState.RUNNING))
-    counts = (func.count().filter(waits), func.count().filter(runs), func.min(Tryout.queued_at).filter(waits))
-    queued, running, since = session.execute(select(*counts).select_from(Tryout)).one()
-    return QueuedTestRuns(queued, running, 0.0 if since is None else max(0.0, (now(session) - since).total_seconds()))
+    is_queued, is_running = (Tryout.state == each.value for each in (RunState.QUEUED, RunState.RUNNING))
+    counts = (
+        func.count().filter(is_queued),
+        func.count().filter(is_running),
+        func.min(Tryout.queued_at).filter(is_queued),
+    )
+    queued_count, running_count, oldest_time = session.execute(select(*counts).select_from(Tryout)).one()
+    return QueuedTestRuns(
+        queued_count,
+        running_count,
+        0.0 if oldest_time is None else max(0.0, (now(session) - oldest_time).total_seconds()),
+    )
 
 
 def load_program(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
@@ -168,8 +186,8 @@ def load_program(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
     query = select(Tryout.packed, AssignmentVersion.content).join(
         AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id
     )
-    packed, content = session.execute(query.where(Tryout.id == tryout_id)).one()
-    return packed, content
+    packed_submission, content = session.execute(query.where(Tryout.id == tryout_id)).one()
+    return packed_submission, content
 
 
 def find_newest_run(session: Session, enrolment_id: int, assignment: str) -> str | None:
@@ -189,18 +207,18 @@ def find_student_run(session: Session, enrolment_id: int, tryout_id: str) -> Stu
         .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
         .where(Tryout.id == tryout_id, Tryout.enrolment_id == enrolment_id)
     )
-    found = session.execute(query).one_or_none()
-    if found is None:
+    run_row = session.execute(query).one_or_none()
+    if run_row is None:
         return None
-    row, assignment, title = found
-    longer = (Tryout.state == RunState.QUEUED.value, Tryout.queued_at < row.queued_at)
+    row, assignment, title = run_row
+    is_earlier = (Tryout.state == RunState.QUEUED.value, Tryout.queued_at < row.queued_at)
     return StudentTestRun(
         row.id,
         assignment,
         title,
         RunState(row.state),
         row.queued_at,
-        session.scalar(select(func.count()).where(*longer)) or 0,
+        session.scalar(select(func.count()).where(*is_earlier)) or 0,
         row.words or {},
         row.error or "",
     )
@@ -211,17 +229,17 @@ def load_replay(session: Session, tryout_id: str) -> bytes | None:
     return session.scalar(select(Tryout.replay).where(Tryout.id == tryout_id))
 
 
-def _match_due(at: datetime) -> ColumnElement[bool]:
-    lost = and_(Tryout.state == RunState.RUNNING.value, Tryout.lease_until < at)
-    return or_(Tryout.state == RunState.QUEUED.value, lost)
+def _match_due(current_time: datetime) -> ColumnElement[bool]:
+    is_lost = and_(Tryout.state == RunState.RUNNING.value, Tryout.lease_until < current_time)
+    return or_(Tryout.state == RunState.QUEUED.value, is_lost)
 
 
-def _update_owned(session: Session, claimed: ClaimedTestRun, **values: Any) -> bool:
-    held = (
-        Tryout.id == claimed.id,
-        Tryout.attempt == claimed.attempt,
+def _update_owned(session: Session, test_run: ClaimedTestRun, **values: Any) -> bool:
+    is_owned = (
+        Tryout.id == test_run.id,
+        Tryout.attempt == test_run.attempt,
         Tryout.state == RunState.RUNNING.value,
     )
     options = {"synchronize_session": False}
-    statement = update(Tryout).where(*held).values(**values)
+    statement = update(Tryout).where(*is_owned).values(**values)
     return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount == 1

@@ -54,16 +54,16 @@ class QuarantinedWorker:
 def record_heartbeat(store: Store, worker: WorkerDescription) -> None:
     """Store the worker's heartbeat. Deletes workers that were last seen more than a day ago."""
     with store.transaction() as session:
-        at = now(session)
+        current_time = now(session)
         row = session.get(Heartbeat, worker.name)
         if row is None:
-            session.execute(delete(Heartbeat).where(Heartbeat.seen_at < at - _RETENTION))
-            row = Heartbeat(worker=worker.name, started_at=at)
+            session.execute(delete(Heartbeat).where(Heartbeat.seen_at < current_time - _RETENTION))
+            row = Heartbeat(worker=worker.name, started_at=current_time)
             session.add(row)
         row.host, row.concurrency = worker.host, worker.concurrency
         row.grader_version, row.sandbox = worker.grader_version, worker.sandbox
         row.problem = worker.problem or None
-        row.seen_at = at
+        row.seen_at = current_time
 
 
 @retry_conflicts
@@ -75,7 +75,7 @@ def delete_heartbeat(store: Store, name: str) -> None:
 
 def load_workers(session: Session) -> list[WorkerLine]:
     """Return all workers with a heartbeat, ordered by name."""
-    at = now(session)
+    current_time = now(session)
     rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
     return [
         WorkerLine(
@@ -84,15 +84,19 @@ def load_workers(session: Session) -> list[WorkerLine]:
             ),
             row.started_at,
             row.seen_at,
-            row.seen_at > at - ALIVE_PERIOD,
+            row.seen_at > current_time - ALIVE_PERIOD,
         )
         for row in rows
     ]
 
 
-def match_other_live_worker(worker: str, at: datetime) -> ColumnElement[bool]:
+def match_other_live_worker(worker: str, current_time: datetime) -> ColumnElement[bool]:
     """Return the condition that another worker was seen recently."""
-    return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > at - ALIVE_PERIOD).exists()
+    return (
+        select(Heartbeat.worker)
+        .where(Heartbeat.worker != worker, Heartbeat.seen_at > current_time - ALIVE_PERIOD)
+        .exists()
+    )
 
 
 def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:

@@ -162,7 +162,7 @@ class NamesAsked(BaseModel):
 
 @router.get("/courses/{course_id}/catalogue")
 def list_catalogue(
-    _here: ReadAccess,
+    _access: ReadAccess,
     limit: Limit = 50,
     after: After = "",
     q: Annotated[
@@ -171,46 +171,54 @@ def list_catalogue(
     topic: Annotated[str, Query(max_length=10, description="Number of a part of the course materials.")] = "",
 ) -> Listed[CatalogueShape]:
     """List the assignments of the catalogue, which every course can use."""
-    place = decode_cursor(after, str)
-    left = (
+    sort_key = decode_cursor(after, str)
+    overviews = (
         read_overview(locate_assignment_folder(each))
         for each in list_catalogue_ids()
-        if place is None or each > place[0]
+        if sort_key is None or each > sort_key[0]
     )
-    found = [each for each in left if each.matches_text(q) and topic in ("", each.topic)][: limit + 1]
-    return build_list_page([CatalogueShape.model_validate(each) for each in found], limit, lambda each: [each.id])
+    matching_overviews = [each for each in overviews if each.matches_text(q) and topic in ("", each.topic)][: limit + 1]
+    return build_list_page(
+        [CatalogueShape.model_validate(each) for each in matching_overviews], limit, lambda each: [each.id]
+    )
 
 
 @router.get("/courses/{course_id}/catalogue/{assignment}")
-def one_of_catalogue(_here: ReadAccess, assignment: AssignmentId) -> AskedShape:
+def one_of_catalogue(_access: ReadAccess, assignment: AssignmentId) -> AskedShape:
     """Return the task of an assignment of the catalogue, as a course would get it."""
     return AskedShape(**_build_assignment_fields(find_in_catalogue(assignment)))
 
 
 @router.get("/courses/{course_id}/assignments")
 def list_assignments(
-    here: ReadAccess, context: Context, limit: Limit = 50, after: After = ""
+    access: ReadAccess, context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[AssignmentShape]:
     """List the course's prepared and open assignments, by id."""
-    place = decode_cursor(after, str)
-    found = assignment_views.list_prepared(context.service, here.actor, here.course_id)
-    left = [AssignmentShape.model_validate(each) for each in found if place is None or each.assignment > place[0]]
-    return build_list_page(left[: limit + 1], limit, lambda each: [each.id])
+    sort_key = decode_cursor(after, str)
+    course_assignments = assignment_views.list_prepared(context.service, access.actor, access.course_id)
+    shapes = [
+        AssignmentShape.model_validate(each)
+        for each in course_assignments
+        if sort_key is None or each.assignment > sort_key[0]
+    ]
+    return build_list_page(shapes[: limit + 1], limit, lambda each: [each.id])
 
 
 @router.post("/courses/{course_id}/assignments", status_code=201)
-def prepare(here: ManageAccess, context: Context, asked: AssignmentAsked) -> AssignmentShape:
+def prepare(access: ManageAccess, context: Context, asked: AssignmentAsked) -> AssignmentShape:
     """Add an assignment of the catalogue to the course without opening it, or update it to the newest version."""
-    made = assignment_uploads.prepare_from_catalogue(context.service, here.actor, here.course_id, asked.assignment)
-    return AssignmentShape.model_validate(made)
+    assignment = assignment_uploads.prepare_from_catalogue(
+        context.service, access.actor, access.course_id, asked.assignment
+    )
+    return AssignmentShape.model_validate(assignment)
 
 
 @router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
 @takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
 def upload(
-    here: ManageAccess,
+    access: ManageAccess,
     context: Context,
-    sent: UploadedZip,
+    zip_path: UploadedZip,
     replace: Annotated[bool, Query(description="Replace another assignment that students have already seen.")] = True,
 ) -> AssignmentShape:
     """Upload an assignment as a zip of its folder; its reference solution is graded as a preview.
@@ -218,16 +226,18 @@ def upload(
     It replaces an assignment with the same ID. If students have seen that one and `replace` is false, the response is
     409.
     """
-    made = assignment_uploads.upload(context.service, here.actor, here.course_id, UploadRequest(sent, replace))
-    return AssignmentShape.model_validate(made)
+    assignment = assignment_uploads.upload(
+        context.service, access.actor, access.course_id, UploadRequest(zip_path, replace)
+    )
+    return AssignmentShape.model_validate(assignment)
 
 
 @router.get("/courses/{course_id}/assignments/{assignment}")
-def one_assignment(here: ReadAccess, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
+def one_assignment(access: ReadAccess, context: Context, assignment: AssignmentId) -> WholeAssignmentShape:
     """Return the task of an assignment of the course, and whether it is open."""
-    line, found = assignment_views.load(context.service, here.actor, here.course_id, assignment)
+    line, content = assignment_views.load(context.service, access.actor, access.course_id, assignment)
     return WholeAssignmentShape(
-        **_build_assignment_fields(found),
+        **_build_assignment_fields(content),
         open=line.open,
         opened_at=line.opened_at,
         closed_at=line.closed_at,
@@ -236,61 +246,63 @@ def one_assignment(here: ReadAccess, context: Context, assignment: AssignmentId)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/preview", status_code=201)
-def preview(here: ManageAccess, context: Context, assignment: AssignmentId) -> PreviewShape:
+def preview(access: ManageAccess, context: Context, assignment: AssignmentId) -> PreviewShape:
     """Grade the reference solution as a submission of the token's owner. It belongs to no batch."""
-    return PreviewShape(job=assignment_uploads.preview(context.service, here.actor, here.course_id, assignment))
+    return PreviewShape(job=assignment_uploads.preview(context.service, access.actor, access.course_id, assignment))
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/open")
-def open_one(here: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
+def open_one(access: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Open an assignment: students can see it and submit."""
-    changed = assignments.open_for_students(context.service, here.actor, here.course_id, assignment)
-    return AssignmentShape.model_validate(changed)
+    course_assignment = assignments.open_for_students(context.service, access.actor, access.course_id, assignment)
+    return AssignmentShape.model_validate(course_assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/close")
-def close_one(here: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
+def close_one(access: ManageAccess, context: Context, assignment: AssignmentId) -> AssignmentShape:
     """Close an assignment for new submissions. Existing submissions are kept."""
-    changed = assignments.close(context.service, here.actor, here.course_id, assignment)
-    return AssignmentShape.model_validate(changed)
+    course_assignment = assignments.close(context.service, access.actor, access.course_id, assignment)
+    return AssignmentShape.model_validate(course_assignment)
 
 
 @router.delete("/courses/{course_id}/assignments/{assignment}", status_code=204, response_class=Response)
-def remove(here: ManageAccess, context: Context, assignment: AssignmentId) -> None:
+def remove(access: ManageAccess, context: Context, assignment: AssignmentId) -> None:
     """Remove an assignment from the course. This is possible only if students have not seen it."""
-    assignments.remove(context.service, here.actor, here.course_id, assignment)
+    assignments.remove(context.service, access.actor, access.course_id, assignment)
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")
-def hide_names(here: ManageAccess, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
+def hide_names(access: ManageAccess, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
     """Hide or show the students' names during marking."""
-    hidden = asked.names_hidden
-    changed = assignments.hide_names(context.service, here.actor, here.course_id, assignment, hidden=hidden)
-    return AssignmentShape.model_validate(changed)
+    names_hidden = asked.names_hidden
+    course_assignment = assignments.hide_names(
+        context.service, access.actor, access.course_id, assignment, names_hidden=names_hidden
+    )
+    return AssignmentShape.model_validate(course_assignment)
 
 
-def _build_assignment_fields(found: Assignment) -> dict[str, Any]:
-    runs = [trial.scenario.id for trial in found.trials()]
+def _build_assignment_fields(assignment: Assignment) -> dict[str, Any]:
+    scenario_ids = [trial.scenario.id for trial in assignment.trials()]
     return {
-        "id": found.id,
-        "title": found.title,
-        "max_marks": found.max_marks,
-        "version": found.version,
-        "description": found.description,
-        "background": found.world.background,
-        "program": found.parts.program,
-        "responder": found.parts.responder,
-        "given": sorted(found.given),
-        "criteria": [MarkedLineShape.model_validate(each) for each in found.criteria],
+        "id": assignment.id,
+        "title": assignment.title,
+        "max_marks": assignment.max_marks,
+        "version": assignment.version,
+        "description": assignment.description,
+        "background": assignment.world.background,
+        "program": assignment.parts.program,
+        "responder": assignment.parts.responder,
+        "given": sorted(assignment.given),
+        "criteria": [MarkedLineShape.model_validate(each) for each in assignment.criteria],
         "scenarios": [
             ScenarioShape(
                 id=each.id,
                 title=each.title,
                 seconds=each.seconds,
-                trials=runs.count(each.id),
+                trials=scenario_ids.count(each.id),
                 visibility=each.visibility,
             )
-            for each in found.scenarios
+            for each in assignment.scenarios
         ],
-        "has_reference": assignment_uploads.find_reference_solution(found) is not None,
+        "has_reference": assignment_uploads.find_reference_solution(assignment) is not None,
     }

@@ -148,19 +148,19 @@ class RetriedShape(Shape):
 
 
 @router.get("/courses/{course_id}/batches")
-def list_batches(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
+def list_batches(access: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[BatchShape]:
     """List the batches of the course, newest first."""
-    place = decode_cursor(after, datetime, str)
-    last = (place[0], place[1]) if place else None
-    found = views.list_batches(context.service, here.actor, here.course_id, limit + 1, last)
-    shown = [BatchShape.model_validate(line) for line in found]
-    return build_list_page(shown, limit, lambda each: [each.created_at, each.id])
+    sort_key = decode_cursor(after, datetime, str)
+    cursor = (sort_key[0], sort_key[1]) if sort_key else None
+    lines = views.list_batches(context.service, access.actor, access.course_id, limit + 1, cursor)
+    shapes = [BatchShape.model_validate(line) for line in lines]
+    return build_list_page(shapes, limit, lambda each: [each.created_at, each.id])
 
 
 @router.post("/courses/{course_id}/batches", status_code=201, openapi_extra=ZIP_BODY)
 @takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def submit_batch(
-    here: SubmitAccess,
+    access: SubmitAccess,
     context: Context,
     upload: UploadedZip,
     name: Annotated[str, Query(min_length=1, max_length=200, description="Name of the batch.")] = "upload",
@@ -174,75 +174,77 @@ def submit_batch(
     again: Annotated[bool, Query(description="Grade submissions again that were already submitted.")] = False,
 ) -> TakenShape:
     """Upload a zip with one submission for each student, in the layout of `robomark batch submit`."""
-    contents = read_upload(context, here.actor, here.course_id, upload, assignment)
-    done = operations.submit(context.service, here.actor, here.course_id, SubmitRequest(name, contents, again))
-    over = [job for job in done.jobs if job.staff_only]
+    contents = read_upload(context, access.actor, access.course_id, upload, assignment)
+    submitted_batch = operations.submit(
+        context.service, access.actor, access.course_id, SubmitRequest(name, contents, again)
+    )
+    over_limit = [job for job in submitted_batch.jobs if job.staff_only]
     return TakenShape(
-        batch=None if done.batch is None else done.batch.id,
-        queued=done.queued,
-        copied=done.copied,
-        known=[KnownShape.model_validate(each) for each in sorted(done.known, key=_extract_student)],
-        for_staff=[ForStaffShape.model_validate(job) for job in sorted(over, key=_extract_student)],
-        refusals=[RefusalShape.model_validate(refusal) for refusal in done.refusals],
+        batch=None if submitted_batch.batch is None else submitted_batch.batch.id,
+        queued=submitted_batch.queued,
+        copied=submitted_batch.copied,
+        known=[KnownShape.model_validate(each) for each in sorted(submitted_batch.known, key=_extract_student)],
+        for_staff=[ForStaffShape.model_validate(job) for job in sorted(over_limit, key=_extract_student)],
+        refusals=[RefusalShape.model_validate(refusal) for refusal in submitted_batch.refusals],
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}")
-def one_batch(here: ReadAccess, context: Context, batch_id: RowName) -> WholeBatchShape:
+def one_batch(access: ReadAccess, context: Context, batch_id: RowName) -> WholeBatchShape:
     """Return a batch with its progress and statistics."""
-    found = views.show_graded(context.service, here.actor, here.course_id, batch_id)
-    pace = found.view.pace
+    graded_view = views.show_graded(context.service, access.actor, access.course_id, batch_id)
+    pace = graded_view.view.pace
     return WholeBatchShape(
-        **BatchShape.model_validate(found.view.batch).model_dump(),
-        progress=ProgressShape.model_validate(found.view.progress),
+        **BatchShape.model_validate(graded_view.view.batch).model_dump(),
+        progress=ProgressShape.model_validate(graded_view.view.progress),
         pace=None if pace is None else PaceShape(per_minute=pace.per_minute, left_seconds=pace.left.total_seconds()),
-        statistics=[StatisticsShape.model_validate(each) for each in found.statistics],
-        unpublished_regrades=found.waiting_regrades,
+        statistics=[StatisticsShape.model_validate(each) for each in graded_view.statistics],
+        unpublished_regrades=graded_view.waiting_regrades,
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/grades")
 def batch_grades(
-    here: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+    access: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[JobShape]:
     """List the submissions of a batch by student, each with its current grade or the reason for a missing grade.
 
     Submissions with hidden names come first, in an order that is independent of the names. For a batch of regrades,
     the grades are the new ones.
     """
-    place = decode_cursor(after, str)
-    last = place[0] if place else None
-    found = views.list_grades(context.service, here.actor, here.course_id, batch_id, limit + 1, last)
-    page = build_list_page(found, limit, lambda each: [each.id])
+    sort_key = decode_cursor(after, str)
+    last_id = sort_key[0] if sort_key else None
+    lines = views.list_grades(context.service, access.actor, access.course_id, batch_id, limit + 1, last_id)
+    page = build_list_page(lines, limit, lambda each: [each.id])
     return Listed(items=[JobShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/pause")
-def pause(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
+def pause(access: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Pause a batch: start no more jobs. Running jobs continue."""
-    done = operations.pause(context.service, here.actor, here.course_id, batch_id)
-    return ControlledShape.model_validate(done)
+    result = operations.pause(context.service, access.actor, access.course_id, batch_id)
+    return ControlledShape.model_validate(result)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/resume")
-def resume(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
+def resume(access: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Resume a paused batch."""
-    done = operations.resume(context.service, here.actor, here.course_id, batch_id)
-    return ControlledShape.model_validate(done)
+    result = operations.resume(context.service, access.actor, access.course_id, batch_id)
+    return ControlledShape.model_validate(result)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/cancel")
-def cancel(here: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
+def cancel(access: SubmitAccess, context: Context, batch_id: RowName) -> ControlledShape:
     """Cancel all unfinished jobs of a batch. Existing grades are kept."""
-    done = operations.cancel(context.service, here.actor, here.course_id, batch_id)
-    return ControlledShape.model_validate(done)
+    result = operations.cancel(context.service, access.actor, access.course_id, batch_id)
+    return ControlledShape.model_validate(result)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/retry")
-def retry(here: SubmitAccess, context: Context, batch_id: RowName) -> RetriedShape:
+def retry(access: SubmitAccess, context: Context, batch_id: RowName) -> RetriedShape:
     """Queue the failed jobs of a batch again."""
-    return RetriedShape.model_validate(operations.retry(context.service, here.actor, here.course_id, batch_id))
+    return RetriedShape.model_validate(operations.retry(context.service, access.actor, access.course_id, batch_id))
 
 
-def _extract_student(each: AcceptedSubmission | KnownSubmission) -> str:
-    return each.student
+def _extract_student(job: AcceptedSubmission | KnownSubmission) -> str:
+    return job.student

@@ -49,8 +49,8 @@ def list_credentials(
     caller: Annotated[Caller, Depends(require_scope("read"))], context: Context
 ) -> Listed[CredentialShape]:
     """List the valid sessions and tokens of the token's owner that the token can access, newest first."""
-    found = credentials.list_credentials(context.service, build_actor(caller.identity))
-    return Listed(items=[CredentialShape.model_validate(each) for each in found])
+    lines = credentials.list_credentials(context.service, build_actor(caller.identity))
+    return Listed(items=[CredentialShape.model_validate(each) for each in lines])
 
 
 @router.delete("/me/credentials/{credential_id}", status_code=204, response_class=Response)

@@ -38,39 +38,41 @@ REPLAY_RESPONSES: ResponseDescriptions = {
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/state")
-def state(here: ReadAccess, context: Context, job_id: RowName) -> JobShape:
+def state(access: ReadAccess, context: Context, job_id: RowName) -> JobShape:
     """Return the state of one grading job."""
-    return JobShape.model_validate(grade_views.show_state(context.service, here.actor, here.course_id, job_id))
+    return JobShape.model_validate(grade_views.show_state(context.service, access.actor, access.course_id, job_id))
 
 
 @router.get("/courses/{course_id}/grades/{job_id}", response_model=GradeShape)
-def grade(request: Request, here: ReadAccess, context: Context, job_id: RowName) -> Response:
+def grade(request: Request, access: ReadAccess, context: Context, job_id: RowName) -> Response:
     """Return a grade with all criteria and trials, including hidden ones; 404 if there is no grade yet."""
     return respond_with_grade(
-        request, job_id, grade_views.show_result(context.service, here.actor, here.course_id, job_id)
+        request, job_id, grade_views.show_result(context.service, access.actor, access.course_id, job_id)
     )
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/report", responses=HTML_RESPONSES, response_class=Response)
-def report(request: Request, here: ReadAccess, context: Context, job_id: RowName) -> Response:
+def report(request: Request, access: ReadAccess, context: Context, job_id: RowName) -> Response:
     """Return the report of a grade as a self-contained page, in the language of `Accept-Language`."""
     language = detect_language(request)
     return respond_with_report(
-        request, grade_views.show_report(context.service, here.actor, here.course_id, job_id, language)
+        request, grade_views.show_report(context.service, access.actor, access.course_id, job_id, language)
     )
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/replay", responses=REPLAY_RESPONSES, response_class=Response)
-def replay(request: Request, here: ReadAccess, context: Context, job_id: RowName) -> Response:
+def replay(request: Request, access: ReadAccess, context: Context, job_id: RowName) -> Response:
     """Return the replay data of the grade's trials."""
-    return respond_with_replay(request, grade_views.show_replay(context.service, here.actor, here.course_id, job_id))
+    return respond_with_replay(
+        request, grade_views.show_replay(context.service, access.actor, access.course_id, job_id)
+    )
 
 
 @router.get("/courses/{course_id}/submissions/{submission_id}/files", responses=ZIP_RESPONSES, response_class=Response)
-def files(here: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
+def files(access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files, as a zip that can be submitted again."""
-    found = grade_views.show_files(context.service, here.actor, here.course_id, submission_id)
-    return respond_with_attachment(found.data, found.name, "application/zip")
+    archive = grade_views.show_files(context.service, access.actor, access.course_id, submission_id)
+    return respond_with_attachment(archive.data, archive.name, "application/zip")
 
 
 def respond_with_grade(request: Request, job_id: str, view: View) -> Response:

@@ -28,9 +28,9 @@ CriterionId = Annotated[str, Path(min_length=1, max_length=200)]
 _SEEN_DESCRIPTION = "ID of the last override that you read, 0 for none. If it has changed since, the response is 409."
 
 
-def _require_owner(here: StudentSubmitAccess, context: Context, submission_id: RowNumber) -> CallerInCourse:
-    appeals.show_own(context.service, here.actor, here.course_id, submission_id)
-    return here
+def _require_owner(access: StudentSubmitAccess, context: Context, submission_id: RowNumber) -> CallerInCourse:
+    appeals.show_own(context.service, access.actor, access.course_id, submission_id)
+    return access
 
 
 #: Checked before the body is read, so that only the submission's owner gets errors about the body.
@@ -164,50 +164,54 @@ class TextAsked(BaseModel):
 
 
 @router.get(GRADE_PATH + "/marking")
-def marking(here: ReadAccess, context: Context, job_id: RowName) -> MarkingShape:
+def marking(access: ReadAccess, context: Context, job_id: RowName) -> MarkingShape:
     """Return the marks of a grade before and after adjustments, and the comments on it."""
-    return MarkingShape.model_validate(grades.show_marking(context.service, here.actor, here.course_id, job_id))
+    return MarkingShape.model_validate(grades.show_marking(context.service, access.actor, access.course_id, job_id))
 
 
 @router.put(GRADE_PATH + "/marking/{criterion}")
 def set_marks(
-    here: MarkAccess, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
+    access: MarkAccess, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
 ) -> MarkingShape:
     """Adjust the marks of a criterion of this submission, or excuse it. Regrades keep the adjustment."""
-    wanted = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
-    return MarkingShape.model_validate(grades.set_marks(context.service, here.actor, here.course_id, job_id, wanted))
+    marks_request = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
+    return MarkingShape.model_validate(
+        grades.set_marks(context.service, access.actor, access.course_id, job_id, marks_request)
+    )
 
 
 @router.delete(GRADE_PATH + "/marking/{criterion}")
 def withdraw(
-    here: MarkAccess,
+    access: MarkAccess,
     context: Context,
     job_id: RowName,
     criterion: CriterionId,
     seen: Annotated[int | None, Query(ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)] = None,
 ) -> MarkingShape:
     """Remove the adjustment of a criterion. The grader's marks apply again."""
-    changed = grades.withdraw_override(context.service, here.actor, here.course_id, job_id, criterion, seen)
-    return MarkingShape.model_validate(changed)
+    marking_view = grades.withdraw_override(context.service, access.actor, access.course_id, job_id, criterion, seen)
+    return MarkingShape.model_validate(marking_view)
 
 
 @router.post(GRADE_PATH + "/comments", status_code=201)
-def comment(here: MarkAccess, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
+def comment(access: MarkAccess, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
     """Add a comment to the student."""
-    wanted = CommentRequest(asked.text, asked.criterion)
-    return MarkingShape.model_validate(grades.add_comment(context.service, here.actor, here.course_id, job_id, wanted))
+    comment_request = CommentRequest(asked.text, asked.criterion)
+    return MarkingShape.model_validate(
+        grades.add_comment(context.service, access.actor, access.course_id, job_id, comment_request)
+    )
 
 
 @router.delete(GRADE_PATH + "/comments/{comment_id}")
-def uncomment(here: MarkAccess, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
+def uncomment(access: MarkAccess, context: Context, job_id: RowName, comment_id: RowNumber) -> MarkingShape:
     """Remove a comment."""
-    changed = grades.withdraw_comment(context.service, here.actor, here.course_id, job_id, comment_id)
-    return MarkingShape.model_validate(changed)
+    marking_view = grades.withdraw_comment(context.service, access.actor, access.course_id, job_id, comment_id)
+    return MarkingShape.model_validate(marking_view)
 
 
 @router.get("/courses/{course_id}/appeals")
 def list_appeals(
-    here: ReadAccess,
+    access: ReadAccess,
     context: Context,
     answered: Annotated[
         bool, Query(description="Return answered appeals, newest first; otherwise open appeals.")
@@ -216,37 +220,37 @@ def list_appeals(
     after: After = "",
 ) -> Listed[AppealShape]:
     """List appeals: the open ones, oldest first, or the answered ones, newest first."""
-    where = (context.service, here.actor, here.course_id)
+    course_key = (context.service, access.actor, access.course_id)
     if answered:
-        last = decode_cursor(after, datetime, int)
-        found = appeals.list_answered(*where, limit=limit + 1, after=last)
-        listed = build_list_page(found, limit, lambda each: [each.answered_at or each.asked_at, each.id])
+        cursor = decode_cursor(after, datetime, int)
+        lines = appeals.list_answered(*course_key, limit=limit + 1, cursor=cursor)
+        page = build_list_page(lines, limit, lambda each: [each.answered_at or each.asked_at, each.id])
     else:
-        place = decode_cursor(after, int)
-        found = appeals.list_open(*where, limit=limit + 1, after=None if place is None else place[0])
-        listed = build_list_page(found, limit, lambda each: [each.id])
-    return Listed(items=[AppealShape.model_validate(each) for each in listed.items], next=listed.next)
+        sort_key = decode_cursor(after, int)
+        lines = appeals.list_open(*course_key, limit=limit + 1, last_id=None if sort_key is None else sort_key[0])
+        page = build_list_page(lines, limit, lambda each: [each.id])
+    return Listed(items=[AppealShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/appeals/{appeal_id}/answer", status_code=204)
-def answer(here: MarkAccess, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
+def answer(access: MarkAccess, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
     """Answer an open appeal and close it."""
-    appeals.answer(context.service, here.actor, here.course_id, appeal_id, asked.text)
+    appeals.answer(context.service, access.actor, access.course_id, appeal_id, asked.text)
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/appeals")
-def own_appeals(here: StudentReadAccess, context: Context, submission_id: RowNumber) -> Listed[AppealShape]:
+def own_appeals(access: StudentReadAccess, context: Context, submission_id: RowNumber) -> Listed[AppealShape]:
     """List the appeals of the token's owner for a submission, with answers, newest first."""
-    return _list_own_appeals(context, here, submission_id)
+    return _list_own_appeals(context, access, submission_id)
 
 
 @router.post("/courses/{course_id}/mine/submissions/{submission_id}/appeals", status_code=201)
-def ask(here: OwnerAccess, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
+def ask(access: OwnerAccess, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
     """Appeal a grade."""
-    appeals.submit(context.service, here.actor, here.course_id, submission_id, asked.text)
-    return _list_own_appeals(context, here, submission_id)
+    appeals.submit(context.service, access.actor, access.course_id, submission_id, asked.text)
+    return _list_own_appeals(context, access, submission_id)
 
 
-def _list_own_appeals(context: WebContext, here: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
-    found = appeals.show_own(context.service, here.actor, here.course_id, submission_id)
-    return Listed(items=[AppealShape.model_validate(each) for each in found.appeals])
+def _list_own_appeals(context: WebContext, access: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
+    appeals_view = appeals.show_own(context.service, access.actor, access.course_id, submission_id)
+    return Listed(items=[AppealShape.model_validate(each) for each in appeals_view.appeals])

@@ -49,10 +49,10 @@ def courses(
     caller: Annotated[Caller, Depends(require_scope("read"))], context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[CourseShape]:
     """List the courses in which the token's owner has a role, in the order of creation."""
-    place = decode_cursor(after, int)
-    beyond = 0 if place is None else place[0]
-    found = [each for each in _list_courses(context, caller) if each.id > beyond]
-    return build_list_page(found[: limit + 1], limit, lambda each: [each.id])
+    sort_key = decode_cursor(after, int)
+    last_id = 0 if sort_key is None else sort_key[0]
+    lines = [each for each in _list_courses(context, caller) if each.id > last_id]
+    return build_list_page(lines[: limit + 1], limit, lambda each: [each.id])
 
 
 def _list_courses(context: WebContext, caller: Caller) -> list[CourseShape]:

@@ -179,32 +179,32 @@ class NewInstructorShape(Shape):
 def service(operator: ReadAccess, context: Context) -> ServiceShape:
     """Return the system status: queue lengths and the results of the system checks."""
     view = system.show(context.service, operator.actor)
-    found = view.metrics
+    metrics = view.metrics
     return ServiceShape(
         version=view.version,
         ready=all(finding.well for finding in view.findings),
         lanes=[
             LaneShape(
                 lane=lane,
-                queued=found.queue.jobs.get((lane, JobState.QUEUED), 0),
-                running=found.queue.jobs.get((lane, JobState.RUNNING), 0),
-                oldest_seconds=found.queue.oldest_seconds.get(lane, 0.0),
+                queued=metrics.queue.jobs.get((lane, JobState.QUEUED), 0),
+                running=metrics.queue.jobs.get((lane, JobState.RUNNING), 0),
+                oldest_seconds=metrics.queue.oldest_seconds.get(lane, 0.0),
             )
             for lane in JobQueue
         ],
         findings=[FindingShape.model_validate(finding) for finding in view.findings],
         tryouts=TryoutLaneShape.model_validate(view.test_runs),
         dead=view.failed_count,
-        host_faults=found.host_faults,
-        paused_batches=found.paused_batches,
+        host_faults=metrics.host_faults,
+        paused_batches=metrics.paused_batches,
     )
 
 
 @router.get("/operator/workers")
 def list_workers(operator: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[WorkerShape]:
     """List the workers, by name."""
-    place = decode_cursor(after, str)
-    shown = [
+    sort_key = decode_cursor(after, str)
+    shapes = [
         WorkerShape(
             name=each.worker.name,
             host=each.worker.host,
@@ -218,30 +218,31 @@ def list_workers(operator: ReadAccess, context: Context, limit: Limit = 50, afte
             problem=each.worker.problem,
         )
         for each, quarantine in system.list_workers(context.service, operator.actor)
-        if place is None or each.worker.name > place[0]
+        if sort_key is None or each.worker.name > sort_key[0]
     ]
-    return build_list_page(shown[: limit + 1], limit, lambda each: [each.name])
+    return build_list_page(shapes[: limit + 1], limit, lambda each: [each.name])
 
 
 @router.get("/operator/courses")
 def list_courses(operator: ReadAccess, context: Context) -> Listed[NamedCourseShape]:
     """List all courses, by name."""
-    found = courses.list_courses(context.service, operator.actor)
-    return Listed(items=[NamedCourseShape.model_validate(each) for each in found])
+    lines = courses.list_courses(context.service, operator.actor)
+    return Listed(items=[NamedCourseShape.model_validate(each) for each in lines])
 
 
 @router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
 def add_instructor(operator: ManageAccess, context: Context, asked: InstructorAsked) -> NewInstructorShape:
     """Add an instructor to a course and return a single-use sign-in link. Creates the course if it does not exist."""
     request = MemberRequest(asked.course, asked.id, asked.name)
-    added = courses.add_member(context.service, operator.actor, request)
+    added_member = courses.add_member(context.service, operator.actor, request)
     return NewInstructorShape(
-        id=added.member.id,
-        course=added.member.course_id,
-        enrolment=added.member.enrolment_id,
-        link=to_link_shape(context, added.secret),
+        id=added_member.member.id,
+        course=added_member.member.course_id,
+        enrolment=added_member.member.enrolment_id,
+        link=to_link_shape(context, added_member.secret),
         elsewhere=[
-            SameIdShape(course=name, enrolment=each.enrolment_id, name=each.name) for name, each in added.elsewhere
+            SameIdShape(course=name, enrolment=each.enrolment_id, name=each.name)
+            for name, each in added_member.elsewhere
         ],
     )
 
@@ -249,8 +250,8 @@ def add_instructor(operator: ManageAccess, context: Context, asked: InstructorAs
 @router.get("/operator/dead")
 def list_dead(operator: ReadAccess, context: Context) -> Listed[DeadShape]:
     """List the newest failed jobs of all courses."""
-    found = system.list_failed(context.service, operator.actor)
-    return Listed(items=[DeadShape.model_validate(each) for each in found])
+    failed_jobs = system.list_failed(context.service, operator.actor)
+    return Listed(items=[DeadShape.model_validate(each) for each in failed_jobs])
 
 
 @router.post("/operator/retry")

@@ -116,7 +116,7 @@ class PublicationShape(Shape):
 @router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))
 @takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def look_first(
-    here: SubmitAccess,
+    access: SubmitAccess,
     context: Context,
     upload: UploadedZip,
     assignment: Annotated[
@@ -128,7 +128,7 @@ def look_first(
     ] = "",
 ) -> PreflightShape:
     """Check a zip with a submission for each student, without submitting it."""
-    checked = read_upload(context, here.actor, here.course_id, upload, assignment)
+    contents = read_upload(context, access.actor, access.course_id, upload, assignment)
     return PreflightShape(
         submissions=[
             ExpectedShape(
@@ -138,15 +138,15 @@ def look_first(
                 assignment=each.request.assignment.id,
                 **asdict(each.intake_preview),
             )
-            for each in preview_submissions(context.service, here.actor, here.course_id, checked)
+            for each in preview_submissions(context.service, access.actor, access.course_id, contents)
         ],
-        refusals=[RefusalShape.model_validate(refusal) for refusal in checked.refusals],
+        refusals=[RefusalShape.model_validate(refusal) for refusal in contents.refusals],
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/overview")
 def show_overview(
-    here: ReadAccess,
+    access: ReadAccess,
     context: Context,
     batch_id: RowName,
     at_least: Annotated[
@@ -154,7 +154,9 @@ def show_overview(
     ] = int(PASS_SHARE * 100),
 ) -> OverviewShape:
     """Return statistics of a batch: marks, criteria, causes of lost marks, outliers and missing submissions."""
-    found = batch_views.show_overview(context.service, here.actor, here.course_id, batch_id, Decimal(at_least) / 100)
+    overview = batch_views.show_overview(
+        context.service, access.actor, access.course_id, batch_id, Decimal(at_least) / 100
+    )
     return OverviewShape(
         classes=[
             ClassShape(
@@ -165,13 +167,13 @@ def show_overview(
                 identical=[[line.student for line in same] for same in each.identical],
                 missing=[MissingShape.model_validate(student) for student in each.missing],
             )
-            for each in found.classes
+            for each in overview.classes
         ]
     )
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/publish")
-def would_publish(here: ReadAccess, context: Context, batch_id: RowName) -> PublicationShape:
+def would_publish(access: ReadAccess, context: Context, batch_id: RowName) -> PublicationShape:
     """Return the effect of publishing the batch now, without publishing it."""
-    found = regrades.preview_publication(context.service, here.actor, here.course_id, batch_id)
-    return PublicationShape.model_validate(found)
+    publication_counts = regrades.preview_publication(context.service, access.actor, access.course_id, batch_id)
+    return PublicationShape.model_validate(publication_counts)

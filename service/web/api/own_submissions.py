@@ -167,13 +167,17 @@ class TaskSheetShape(Shape):
 
 
 @router.get(PREFIX + "/assignments")
-def list_open(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[OpenShape]:
+def list_open(access: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[OpenShape]:
     """List the assignments that the course shows to students, by id."""
-    place = decode_cursor(after, str)
-    found = own_views.list_opened(
-        context.service, here.actor, here.course_id, limit=limit + 1, after=place[0] if place else ""
+    sort_key = decode_cursor(after, str)
+    opened_assignments = own_views.list_opened(
+        context.service,
+        access.actor,
+        access.course_id,
+        limit=limit + 1,
+        last_assignment=sort_key[0] if sort_key else "",
     )
-    shown = [
+    shapes = [
         OpenShape(
             id=each.assignment,
             title=each.title,
@@ -183,92 +187,98 @@ def list_open(here: ReadAccess, context: Context, limit: Limit = 50, after: Afte
             attempts_left=left.attempts_left,
             days_left=left.days_left,
         )
-        for each, left in found
+        for each, left in opened_assignments
     ]
-    return build_list_page(shown, limit, lambda each: [each.id])
+    return build_list_page(shapes, limit, lambda each: [each.id])
 
 
 @router.get(PREFIX + "/assignments/{assignment}")
-def one_assignment(here: ReadAccess, context: Context, assignment: AssignmentId) -> TaskSheetShape:
+def one_assignment(access: ReadAccess, context: Context, assignment: AssignmentId) -> TaskSheetShape:
     """Return the task of an assignment that is open or has a submission of the token's owner."""
-    sheet = own_views.show_sheet(context.service, here.actor, here.course_id, assignment)
+    sheet = own_views.show_sheet(context.service, access.actor, access.course_id, assignment)
     criteria = [CriterionAskedShape(title=title, marks=float(marks)) for title, marks in sheet.criteria]
-    told = {field.name: getattr(sheet, field.name) for field in fields(sheet)}
-    return TaskSheetShape.model_validate(told | {"criteria": criteria, "given": sorted(sheet.given)})
+    sheet_fields = {field.name: getattr(sheet, field.name) for field in fields(sheet)}
+    return TaskSheetShape.model_validate(sheet_fields | {"criteria": criteria, "given": sorted(sheet.given)})
 
 
 @router.get(PREFIX + "/assignments/{assignment}/given/{file}", responses=GIVEN_RESPONSES, response_class=Response)
-def given_file(here: ReadAccess, context: Context, assignment: AssignmentId, file: str) -> Response:
+def given_file(access: ReadAccess, context: Context, assignment: AssignmentId, file: str) -> Response:
     """Return a file that students receive with the assignment."""
     return respond_with_attachment(
-        own_views.show_given_file(context.service, here.actor, here.course_id, assignment, file), file
+        own_views.show_given_file(context.service, access.actor, access.course_id, assignment, file), file
     )
 
 
 @router.post(PREFIX + "/submissions", status_code=201, openapi_extra=SENT_BODY)
 @takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def submit_one(
-    here: SubmitAccess,
+    access: SubmitAccess,
     context: Context,
-    sent: SentFiles,
+    uploaded_files: SentFiles,
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> SubmissionShape:
     """Submit a robot program, a responder, a notebook, or a zip with them. Send each file as a form part `files`."""
-    accepted = submit(context, here.actor, here.course_id, SubmissionRequest(assignment, sent, even_in_part=True))
+    accepted_submission = submit(
+        context, access.actor, access.course_id, SubmissionRequest(assignment, uploaded_files, even_in_part=True)
+    )
     return _to_submission_shape(
-        own_views.show_submission(context.service, here.actor, here.course_id, accepted.submission_id)
+        own_views.show_submission(context.service, access.actor, access.course_id, accepted_submission.submission_id)
     )
 
 
 @router.get(PREFIX + "/submissions")
 def list_submissions(
-    here: ReadAccess, context: Context, limit: Limit = 50, after: After = ""
+    access: ReadAccess, context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[SubmissionShape]:
     """List the submissions of the token's owner in the course, newest first."""
-    place = decode_cursor(after, int)
-    found = own_views.list_submissions(
-        context.service, here.actor, here.course_id, limit=limit + 1, before=place[0] if place else None
+    sort_key = decode_cursor(after, int)
+    views = own_views.list_submissions(
+        context.service, access.actor, access.course_id, limit=limit + 1, before_id=sort_key[0] if sort_key else None
     )
-    return build_list_page([_to_submission_shape(each) for each in found], limit, lambda each: [each.id])
+    return build_list_page([_to_submission_shape(each) for each in views], limit, lambda each: [each.id])
 
 
 @router.get(PREFIX + "/submissions/{submission_id}")
-def one_submission(here: ReadAccess, context: Context, submission_id: RowNumber) -> SubmissionShape:
+def one_submission(access: ReadAccess, context: Context, submission_id: RowNumber) -> SubmissionShape:
     """Return a submission and its grading state."""
-    return _to_submission_shape(own_views.show_submission(context.service, here.actor, here.course_id, submission_id))
+    return _to_submission_shape(
+        own_views.show_submission(context.service, access.actor, access.course_id, submission_id)
+    )
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/grade", response_model=GradeShape)
-def grade(request: Request, here: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
+def grade(request: Request, access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the parts of the grade that the student can see now; 404 if there is no grade yet."""
-    job_id, view = own_views.show_result(context.service, here.actor, here.course_id, submission_id)
+    job_id, view = own_views.show_result(context.service, access.actor, access.course_id, submission_id)
     return respond_with_grade(request, job_id, view)
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/report", responses=HTML_RESPONSES, response_class=Response)
-def report(request: Request, here: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
+def report(request: Request, access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the parts of the report that the student can see now, in the language of `Accept-Language`."""
-    asked = (context.service, here.actor, here.course_id, submission_id)
-    return respond_with_report(request, own_views.show_report(*asked, detect_language(request)))
+    submission_key = (context.service, access.actor, access.course_id, submission_id)
+    return respond_with_report(request, own_views.show_report(*submission_key, detect_language(request)))
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/replay", responses=REPLAY_RESPONSES, response_class=Response)
-def replay(request: Request, here: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
+def replay(request: Request, access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the replay data of the trials that the student can see now."""
     return respond_with_replay(
-        request, own_views.show_replay(context.service, here.actor, here.course_id, submission_id)
+        request, own_views.show_replay(context.service, access.actor, access.course_id, submission_id)
     )
 
 
 @router.get(PREFIX + "/submissions/{submission_id}/files", responses=ZIP_RESPONSES, response_class=Response)
-def files(here: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
+def files(access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files, as a zip that can be submitted again."""
-    found = own_views.show_files(context.service, here.actor, here.course_id, submission_id)
-    return respond_with_attachment(found.data, found.name, "application/zip")
+    archive = own_views.show_files(context.service, access.actor, access.course_id, submission_id)
+    return respond_with_attachment(archive.data, archive.name, "application/zip")
 
 
-def _to_submission_shape(found: SubmissionView) -> SubmissionShape:
-    shape = SubmissionShape.model_validate(found.submission)
-    place = None if found.place is None else PlaceShape.model_validate(found.place)
-    progress = 1.0 if found.place is None else found.place.progress
-    return shape.model_copy(update={"over": found.submission.staff_only or None, "place": place, "progress": progress})
+def _to_submission_shape(view: SubmissionView) -> SubmissionShape:
+    shape = SubmissionShape.model_validate(view.submission)
+    queue_place = None if view.place is None else PlaceShape.model_validate(view.place)
+    progress = 1.0 if view.place is None else view.place.progress
+    return shape.model_copy(
+        update={"over": view.submission.staff_only or None, "place": queue_place, "progress": progress}
+    )

@@ -157,26 +157,26 @@ class LimitsShape(Shape):
 
 
 @router.get("/courses/{course_id}/people")
-def list_people(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
+def list_people(access: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[MemberShape]:
     """List the members of the course, in the order of enrolment."""
-    place = decode_cursor(after, int)
-    actor, start = here.actor, 0 if place is None else place[0]
-    found = people_views.list_members_after(context.service, actor, here.course_id, start, limit + 1)
-    return build_list_page([MemberShape.model_validate(each) for each in found], limit, lambda each: [each.enrolment])
+    sort_key = decode_cursor(after, int)
+    actor, start = access.actor, 0 if sort_key is None else sort_key[0]
+    members = people_views.list_members_after(context.service, actor, access.course_id, start, limit + 1)
+    return build_list_page([MemberShape.model_validate(each) for each in members], limit, lambda each: [each.enrolment])
 
 
 @router.post("/courses/{course_id}/people", status_code=201)
-def enrol(here: ManageAccess, context: Context, asked: EnrolAsked) -> EnrolledShape:
+def enrol(access: ManageAccess, context: Context, asked: EnrolAsked) -> EnrolledShape:
     """Enrol students. The names and e-mail addresses of enrolled students are updated."""
     students = [Student(each.id, each.name, each.email) for each in asked.students]
-    people.enrol(context.service, here.actor, here.course_id, students)
+    people.enrol(context.service, access.actor, access.course_id, students)
     return EnrolledShape(students=len(asked.students))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}")
-def one_student(here: ReadAccess, context: Context, enrolment_id: RowNumber) -> StudentShape:
+def one_student(access: ReadAccess, context: Context, enrolment_id: RowNumber) -> StudentShape:
     """Return a student with extensions and submissions. Submissions to assignments with hidden names are omitted."""
-    view = people_views.show_student(context.service, here.actor, here.course_id, enrolment_id)
+    view = people_views.show_student(context.service, access.actor, access.course_id, enrolment_id)
     return StudentShape.model_validate(
         asdict(view.member)
         | {"gradings": view.gradings, "some_hidden": view.some_hidden, "extensions": view.extensions}
@@ -185,56 +185,58 @@ def one_student(here: ReadAccess, context: Context, enrolment_id: RowNumber) -> 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/limits/{assignment}")
 def limits(
-    here: ReadAccess,
+    access: ReadAccess,
     context: Context,
     enrolment_id: RowNumber,
     assignment: Annotated[str, Path(min_length=1, max_length=100)],
 ) -> LimitsShape:
     """Return the limits of one student for an assignment: the policy with the student's extension."""
-    found = policies.show_limits(context.service, here.actor, here.course_id, enrolment_id, assignment)
-    return LimitsShape.model_validate(found)
+    policy_limits = policies.show_limits(context.service, access.actor, access.course_id, enrolment_id, assignment)
+    return LimitsShape.model_validate(policy_limits)
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/extensions", status_code=201)
-def extend(here: ManageAccess, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
+def extend(access: ManageAccess, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
     """Allow one student more time or attempts."""
     request = ExtensionRequest(asked.assignment, asked.due_at, asked.more_attempts)
-    found = policies.extend(context.service, here.actor, here.course_id, enrolment_id, request)
-    return LimitsShape.model_validate(found)
+    policy_limits = policies.extend(context.service, access.actor, access.course_id, enrolment_id, request)
+    return LimitsShape.model_validate(policy_limits)
 
 
 @router.get("/courses/{course_id}/policies")
-def list_policies(here: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
+def list_policies(access: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
     """List the policies: deadline and attempts, by assignment."""
-    place = decode_cursor(after, str)
-    found = policies.list_policies(context.service, here.actor, here.course_id)
-    left = [
-        _to_policy_shape(name, allowed) for name, allowed in sorted(found.items()) if place is None or name > place[0]
+    sort_key = decode_cursor(after, str)
+    limits_by_assignment = policies.list_policies(context.service, access.actor, access.course_id)
+    shapes = [
+        _to_policy_shape(name, allowed)
+        for name, allowed in sorted(limits_by_assignment.items())
+        if sort_key is None or name > sort_key[0]
     ]
-    return build_list_page(left[: limit + 1], limit, lambda each: [each.assignment])
+    return build_list_page(shapes[: limit + 1], limit, lambda each: [each.assignment])
 
 
 @router.put("/courses/{course_id}/policies")
-def set_policy(here: ManageAccess, context: Context, asked: PolicyAsked) -> PolicyShape:
+def set_policy(access: ManageAccess, context: Context, asked: PolicyAsked) -> PolicyShape:
     """Set the policy of an assignment. Without an assignment, set the course's default policy."""
-    allowed = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
-    policies.set_policy(context.service, here.actor, here.course_id, asked.assignment, allowed)
-    return _to_policy_shape(asked.assignment, allowed)
+    policy_limits = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
+    policies.set_policy(context.service, access.actor, access.course_id, asked.assignment, policy_limits)
+    return _to_policy_shape(asked.assignment, policy_limits)
 
 
 @router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)
 def drop_policy(
-    here: ManageAccess, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
+    access: ManageAccess, context: Context, assignment: Annotated[str, Query(min_length=1, max_length=100)]
 ) -> None:
     """Remove the policy of an assignment; the course's default policy applies."""
-    policies.drop_policy(context.service, here.actor, here.course_id, assignment)
+    policies.drop_policy(context.service, access.actor, access.course_id, assignment)
 
 
-def _to_policy_shape(assignment: str, allowed: PolicyLimits) -> PolicyShape:
+def _to_policy_shape(assignment: str, policy_limits: PolicyLimits) -> PolicyShape:
     return PolicyShape(
         assignment=assignment,
-        due_at=allowed.due_at,
-        late_days=allowed.late_days,
-        attempts=allowed.attempts,
-        cool_down_seconds=allowed.cool_down_seconds,
+        due_at=policy_limits.due_at,
+        late_days=policy_limits.late_days,
+        attempts=policy_limits.attempts,
+        cool_down_seconds=policy_limits.cool_down_seconds,
     )

@@ -109,23 +109,23 @@ class SentShape(Shape):
 @router.get("/operator/platforms")
 def list_platforms(operator: OperatorReadAccess, context: Context) -> Listed[PlatformShape]:
     """List the registered platforms, by name."""
-    found = platforms.list_platforms(context.service, operator.actor)
-    return Listed(items=[PlatformShape.model_validate(each) for each in found])
+    lines = platforms.list_platforms(context.service, operator.actor)
+    return Listed(items=[PlatformShape.model_validate(each) for each in lines])
 
 
 @router.post("/operator/platforms", status_code=201)
 def register(operator: OperatorManageAccess, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
     """Register a platform, or update the one with the same issuer and client ID. Returns all registered platforms."""
-    lists = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
-    request = Registration(**(asked.model_dump() | lists))
-    found = platforms.register(context.service, operator.actor, request)
-    return Listed(items=[PlatformShape.model_validate(each) for each in found])
+    tuples = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
+    request = Registration(**(asked.model_dump() | tuples))
+    lines = platforms.register(context.service, operator.actor, request)
+    return Listed(items=[PlatformShape.model_validate(each) for each in lines])
 
 
 @router.get("/courses/{course_id}/platform")
-def course_platform(here: ReadAccess, context: Context) -> CoursePlatformShape:
+def course_platform(access: ReadAccess, context: Context) -> CoursePlatformShape:
     """Return the platform from which the course is launched, if there is one."""
-    link = platforms.show_course_platform(context.service, here.actor, here.course_id).link
+    link = platforms.show_course_platform(context.service, access.actor, access.course_id).link
     if link is None:
         return CoursePlatformShape(name=None, members=False, marks=False)
     marks = link.lineitems_url is not None
@@ -133,13 +133,13 @@ def course_platform(here: ReadAccess, context: Context) -> CoursePlatformShape:
 
 
 @router.post("/courses/{course_id}/platform/members", responses=_PLATFORM_ERRORS)
-def enrol_members(here: ManageAccess, context: Context) -> EnrolledMembersShape:
+def enrol_members(access: ManageAccess, context: Context) -> EnrolledMembersShape:
     """Enrol all members of the course on the platform."""
-    enrolled = platforms.enrol_members(context.service, here.actor, here.course_id)
-    return EnrolledMembersShape.model_validate(enrolled)
+    enrolled_members = platforms.enrol_members(context.service, access.actor, access.course_id)
+    return EnrolledMembersShape.model_validate(enrolled_members)
 
 
 @router.post("/courses/{course_id}/platform/marks", responses=_PLATFORM_ERRORS)
-def pass_back(here: ManageAccess, context: Context, asked: MarksOfAsked) -> SentShape:
+def pass_back(access: ManageAccess, context: Context, asked: MarksOfAsked) -> SentShape:
     """Send the published marks of an assignment to the platform's gradebook."""
-    return SentShape(sent=platforms.pass_back(context.service, here.actor, here.course_id, asked.assignment))
+    return SentShape(sent=platforms.pass_back(context.service, access.actor, access.course_id, asked.assignment))

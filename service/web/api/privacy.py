@@ -33,27 +33,29 @@ class ErasedShape(Shape):
 
 
 @router.get("/courses/{course_id}/mine/data", responses=ZIP_RESPONSES, response_class=Response)
-def own_data(here: ReadAccess, context: Context) -> Response:
+def own_data(access: ReadAccess, context: Context) -> Response:
     """Return the data of the token's owner in the course, as a zip of JSON, submissions and reports.
 
     Contains only the parts that the owner can see as a student.
     """
-    return _respond_with_zip(privacy.export_own(context.service, here.actor, here.course_id))
+    return _respond_with_zip(privacy.export_own(context.service, access.actor, access.course_id))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}/data", responses=ZIP_RESPONSES, response_class=Response)
-def data(here: ManageAccess, context: Context, enrolment_id: RowNumber) -> Response:
+def data(access: ManageAccess, context: Context, enrolment_id: RowNumber) -> Response:
     """Return the data of a student of the course, as visible to the student.
 
     Assignments with hidden names are omitted.
     """
-    return _respond_with_zip(privacy.export_student(context.service, here.actor, here.course_id, enrolment_id))
+    return _respond_with_zip(privacy.export_student(context.service, access.actor, access.course_id, enrolment_id))
 
 
 @router.delete("/courses/{course_id}/people/{student_id}")
-def erase(here: ManageAccess, context: Context, student_id: RowNumber) -> ErasedShape:
+def erase(access: ManageAccess, context: Context, student_id: RowNumber) -> ErasedShape:
     """Permanently delete a student's submissions, grades, recordings and personal data from the course."""
-    return ErasedShape.model_validate(privacy.erase_student(context.service, here.actor, here.course_id, student_id))
+    return ErasedShape.model_validate(
+        privacy.erase_student(context.service, access.actor, access.course_id, student_id)
+    )
 
 
 def _respond_with_zip(data: StudentData) -> Response:

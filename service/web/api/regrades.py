@@ -129,68 +129,76 @@ class PublishedShape(Shape):
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
-def regrade(here: MarkAccess, context: Context, batch_id: RowName, asked: RegradeAsked | None = None) -> RegradedShape:
+def regrade(
+    access: MarkAccess, context: Context, batch_id: RowName, asked: RegradeAsked | None = None
+) -> RegradedShape:
     """Grade a batch again. The old grades apply until you publish the new ones."""
     name = "" if asked is None else asked.assignment
-    made = operations.regrade_batch(context.service, here.actor, here.course_id, batch_id, name)
-    return RegradedShape.model_validate(made)
+    regrade_batch = operations.regrade_batch(context.service, access.actor, access.course_id, batch_id, name)
+    return RegradedShape.model_validate(regrade_batch)
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/changes")
 def changes(
-    here: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+    access: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
 ) -> Listed[ChangeShape]:
     """List the changes of a batch of regrades, by student; empty for other batches."""
-    place = decode_cursor(after, str)
-    found = operations.list_changes(context.service, here.actor, here.course_id, batch_id)
-    ids = [each.job_id for each in found]
-    start = 0 if place is None else ids.index(place[0]) + 1 if place[0] in ids else len(ids)
-    page = build_list_page(found[start : start + limit + 1], limit, lambda each: [each.job_id])
+    sort_key = decode_cursor(after, str)
+    all_changes = operations.list_changes(context.service, access.actor, access.course_id, batch_id)
+    job_ids = [each.job_id for each in all_changes]
+    start = 0 if sort_key is None else job_ids.index(sort_key[0]) + 1 if sort_key[0] in job_ids else len(job_ids)
+    page = build_list_page(all_changes[start : start + limit + 1], limit, lambda each: [each.job_id])
     return Listed(items=[ChangeShape.model_validate(each) for each in page.items], next=page.next)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
-def publish(here: MarkAccess, context: Context, batch_id: RowName, asked: PublishAsked | None = None) -> PublishedShape:
+def publish(
+    access: MarkAccess, context: Context, batch_id: RowName, asked: PublishAsked | None = None
+) -> PublishedShape:
     """Publish the newest grades of a batch. They become the current grades, and students can see them."""
-    anyway = asked is not None and asked.anyway
-    done = operations.publish(context.service, here.actor, here.course_id, batch_id, anyway=anyway)
-    return PublishedShape.model_validate(done)
+    includes_unjudged = asked is not None and asked.anyway
+    publication_counts = operations.publish(
+        context.service, access.actor, access.course_id, batch_id, includes_unjudged=includes_unjudged
+    )
+    return PublishedShape.model_validate(publication_counts)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/publish")
 def publish_one(
-    here: MarkAccess, context: Context, job_id: RowName, asked: PublishAsked | None = None
+    access: MarkAccess, context: Context, job_id: RowName, asked: PublishAsked | None = None
 ) -> PublishedShape:
     """Publish the newest grade of a submission. It becomes the current grade, and the student can see it."""
-    anyway = asked is not None and asked.anyway
-    done = operations.publish_one(context.service, here.actor, here.course_id, job_id, anyway=anyway)
-    return PublishedShape.model_validate(done)
+    includes_unjudged = asked is not None and asked.anyway
+    publication_counts = operations.publish_one(
+        context.service, access.actor, access.course_id, job_id, includes_unjudged=includes_unjudged
+    )
+    return PublishedShape.model_validate(publication_counts)
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
 def regrade_one(
-    here: MarkAccess, context: Context, job_id: RowName, asked: RegradeAsked | None = None
+    access: MarkAccess, context: Context, job_id: RowName, asked: RegradeAsked | None = None
 ) -> RegradedOneShape:
     """Grade a submission again. The old grade applies until you publish the new one."""
     name = "" if asked is None else asked.assignment
-    return RegradedOneShape(job=operations.regrade_one(context.service, here.actor, here.course_id, job_id, name))
+    return RegradedOneShape(job=operations.regrade_one(context.service, access.actor, access.course_id, job_id, name))
 
 
 @router.post("/courses/{course_id}/grades/{job_id}/over-limit", status_code=204)
-def grade_over_limit(here: MarkAccess, context: Context, job_id: RowName) -> None:
+def grade_over_limit(access: MarkAccess, context: Context, job_id: RowName) -> None:
     """Grade a submission that was not graded because it exceeds a limit."""
-    operations.grade_over_limit(context.service, here.actor, here.course_id, job_id)
+    operations.grade_over_limit(context.service, access.actor, access.course_id, job_id)
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/export", responses=_FILE_RESPONSES, response_class=Response)
 def export(
-    here: ReadAccess, context: Context, batch_id: RowName, form: FormatName = "csv", published: PublishedOnly = False
+    access: ReadAccess, context: Context, batch_id: RowName, form: FormatName = "csv", published: PublishedOnly = False
 ) -> Response:
     """Export the grades of a batch in a format of `robomark batch export`.
 
     Formats that are not tables return a zip with one file for each grade.
     """
-    return _respond_with_export(context, here, batch_id, ExportRequest(form, published))
+    return _respond_with_export(context, access, batch_id, ExportRequest(form, published))
 
 
 @router.post(
@@ -201,18 +209,20 @@ def export(
 )
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 async def worksheet(
-    request: Request, here: ReadAccess, context: Context, batch_id: RowName, published: PublishedOnly = False
+    request: Request, access: ReadAccess, context: Context, batch_id: RowName, published: PublishedOnly = False
 ) -> Response:
     """Return the uploaded Moodle grading worksheet with the grades filled in. Stored data does not change."""
-    given = await request.body()
+    content = await request.body()
     try:
-        text = given.decode("utf-8")
+        text = content.decode("utf-8")
     except UnicodeDecodeError:
         raise HTTPException(422, "The worksheet is not in UTF-8; upload the original file from Moodle.") from None
-    asked = ExportRequest("moodle-worksheet", published, text)
-    return await run_in_threadpool(_respond_with_export, context, here, batch_id, asked)
+    export_request = ExportRequest("moodle-worksheet", published, text)
+    return await run_in_threadpool(_respond_with_export, context, access, batch_id, export_request)
 
 
-def _respond_with_export(context: WebContext, here: CallerInCourse, batch_id: str, asked: ExportRequest) -> Response:
-    made = download(context.service, here.actor, here.course_id, batch_id, asked)
-    return respond_with_attachment(made.data, made.name, made.media_type)
+def _respond_with_export(
+    context: WebContext, access: CallerInCourse, batch_id: str, export_request: ExportRequest
+) -> Response:
+    exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
+    return respond_with_attachment(exported.data, exported.name, exported.media_type)

@@ -44,8 +44,8 @@ BATCH_EXAMPLE: Mapping[str, Any] = MappingProxyType(
 
 def find_example(shape: type[Shape]) -> Any:
     """Return the example of a model."""
-    extra: Any = shape.model_config["json_schema_extra"]
-    return extra["examples"][0]
+    schema_extra: Any = shape.model_config["json_schema_extra"]
+    return schema_extra["examples"][0]
 
 
 class CourseShape(Shape):

@@ -72,35 +72,35 @@ class StudentLinksShape(Shape):
 
 
 @router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
-def links(here: ManageAccess, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
+def links(access: ManageAccess, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
     """Create sign-in links for the students of the course, by ID. Earlier links become invalid."""
     days = sign_in_links.DAYS if asked is None else asked.days
-    made = sign_in_links.make_links(context.service, here.actor, here.course_id, days)
-    return StudentLinksShape(links=[_to_student_link_shape(context, each) for each in made])
+    student_links = sign_in_links.make_links(context.service, access.actor, access.course_id, days)
+    return StudentLinksShape(links=[_to_student_link_shape(context, each) for each in student_links])
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/link", status_code=201, openapi_extra=dict(NO_KEY))
-def link(here: ManageAccess, context: Context, enrolment_id: RowNumber) -> LinkShape:
+def link(access: ManageAccess, context: Context, enrolment_id: RowNumber) -> LinkShape:
     """Create a sign-in link for a student of the course. Instructors get theirs from an operator."""
-    secret = sign_in_links.make_students_link(context.service, here.actor, here.course_id, enrolment_id)
+    secret = sign_in_links.make_students_link(context.service, access.actor, access.course_id, enrolment_id)
     return to_link_shape(context, secret)
 
 
 def to_link_shape(context: WebContext, secret: str) -> LinkShape:
     """Return a sign-in link as the response model."""
-    path, public = f"/sign-in/{secret}", context.settings.public_url
-    return LinkShape(path=path, url=f"{public}{path}" if public else None)
+    path, public_url = f"/sign-in/{secret}", context.settings.public_url
+    return LinkShape(path=path, url=f"{public_url}{path}" if public_url else None)
 
 
-def _to_student_link_shape(context: WebContext, each: StudentLink) -> StudentLinkShape:
-    shown = None if each.secret is None else to_link_shape(context, each.secret)
+def _to_student_link_shape(context: WebContext, student_link: StudentLink) -> StudentLinkShape:
+    link_shape = None if student_link.secret is None else to_link_shape(context, student_link.secret)
     return StudentLinkShape(
-        enrolment=each.student.enrolment_id,
-        id=each.student.id,
-        name=each.student.name,
-        email=each.student.email,
-        path=None if shown is None else shown.path,
-        url=None if shown is None else shown.url,
-        expires_at=each.expires_at,
-        reason=each.reason,
+        enrolment=student_link.student.enrolment_id,
+        id=student_link.student.id,
+        name=student_link.student.name,
+        email=student_link.student.email,
+        path=None if link_shape is None else link_shape.path,
+        url=None if link_shape is None else link_shape.url,
+        expires_at=student_link.expires_at,
+        reason=student_link.reason,
     )

@@ -87,7 +87,7 @@ class SimilaritiesShape(Shape):
 
 
 @router.get("/courses/{course_id}/batches/{batch_id}/similar")
-def show_similar(here: ReadAccess, context: Context, batch_id: RowName) -> SimilaritiesShape:
+def show_similar(access: ReadAccess, context: Context, batch_id: RowName) -> SimilaritiesShape:
     """List the pairs of students with similar newest submissions. Similarity is a reason for a review, not a proof."""
-    found = list_similar(context.service, here.actor, here.course_id, batch_id)
-    return SimilaritiesShape(assignments=[SimilarityShape.model_validate(each) for each in found])
+    similarities = list_similar(context.service, access.actor, access.course_id, batch_id)
+    return SimilaritiesShape(assignments=[SimilarityShape.model_validate(each) for each in similarities])

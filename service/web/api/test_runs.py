@@ -57,30 +57,30 @@ class TryoutShape(Shape):
 @router.post(PREFIX, status_code=201, openapi_extra=SENT_BODY)
 @takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def ask(
-    here: SubmitAccess,
+    access: SubmitAccess,
     context: Context,
-    sent: SentFiles,
+    uploaded_files: SentFiles,
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
 ) -> TryoutShape:
     """Start a test run at the first pose of the first visible scenario.
 
     A test run has no marks and does not count as an attempt.
     """
-    made = start_test_run(context, here.actor, here.course_id, assignment, sent)
-    return _to_tryout_shape(test_runs.show(context.service, here.actor, here.course_id, made))
+    test_run_id = start_test_run(context, access.actor, access.course_id, assignment, uploaded_files)
+    return _to_tryout_shape(test_runs.show(context.service, access.actor, access.course_id, test_run_id))
 
 
 @router.get(PREFIX + "/{tryout_id}")
-def one_tryout(here: ReadAccess, context: Context, tryout_id: RowName) -> TryoutShape:
+def one_tryout(access: ReadAccess, context: Context, tryout_id: RowName) -> TryoutShape:
     """Return the state and the result of a test run. Test runs are deleted after a day."""
-    return _to_tryout_shape(test_runs.show(context.service, here.actor, here.course_id, tryout_id))
+    return _to_tryout_shape(test_runs.show(context.service, access.actor, access.course_id, tryout_id))
 
 
 @router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY_RESPONSES, response_class=Response)
-def replay(request: Request, here: ReadAccess, context: Context, tryout_id: RowName) -> Response:
+def replay(request: Request, access: ReadAccess, context: Context, tryout_id: RowName) -> Response:
     """Return the data of a replay of the test run; 404 until it is available."""
-    kept = test_runs.show_replay(context.service, here.actor, here.course_id, tryout_id)
-    return respond_with_etag(request, zlib.decompress(kept), "application/json")
+    compressed = test_runs.show_replay(context.service, access.actor, access.course_id, tryout_id)
+    return respond_with_etag(request, zlib.decompress(compressed), "application/json")
 
 
 def _to_tryout_shape(line: StudentTestRun) -> TryoutShape:

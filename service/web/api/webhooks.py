@@ -86,33 +86,33 @@ class DeliveryShape(Shape):
 
 
 @router.get("/courses/{course_id}/webhooks")
-def list_webhooks(here: ManageAccess, context: Context) -> Listed[WebhookShape]:
+def list_webhooks(access: ManageAccess, context: Context) -> Listed[WebhookShape]:
     """List the webhooks of the course."""
-    found = webhooks.list_webhooks(context.service, here.actor, here.course_id)
-    return Listed(items=[WebhookShape.model_validate(each) for each in found])
+    lines = webhooks.list_webhooks(context.service, access.actor, access.course_id)
+    return Listed(items=[WebhookShape.model_validate(each) for each in lines])
 
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
-def create(here: ManageAccess, context: Context, asked: WebhookAsked) -> NewWebhookShape:
+def create(access: ManageAccess, context: Context, asked: WebhookAsked) -> NewWebhookShape:
     """Create a webhook. Its secret is returned only once, so this route ignores idempotency keys."""
-    line, secret = webhooks.create(context.service, here.actor, here.course_id, asked.url, asked.events)
+    line, secret = webhooks.create(context.service, access.actor, access.course_id, asked.url, asked.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
 
 @router.delete("/courses/{course_id}/webhooks/{webhook_id}", status_code=204, response_class=Response)
-def revoke(here: ManageAccess, context: Context, webhook_id: RowName) -> None:
+def revoke(access: ManageAccess, context: Context, webhook_id: RowName) -> None:
     """Remove a webhook and cancel its pending deliveries."""
-    webhooks.revoke(context.service, here.actor, here.course_id, webhook_id)
+    webhooks.revoke(context.service, access.actor, access.course_id, webhook_id)
 
 
 @router.get("/courses/{course_id}/deliveries")
 def list_deliveries(
-    here: ManageAccess, context: Context, limit: Limit = 50, after: After = ""
+    access: ManageAccess, context: Context, limit: Limit = 50, after: After = ""
 ) -> Listed[DeliveryShape]:
     """List recent and pending deliveries to the course's webhooks, newest first."""
-    place = decode_cursor(after, datetime, str)
-    after_that = (place[0], place[1]) if place else None
-    found = webhooks.list_deliveries(context.service, here.actor, here.course_id, limit + 1, after_that)
+    sort_key = decode_cursor(after, datetime, str)
+    cursor = (sort_key[0], sort_key[1]) if sort_key else None
+    lines = webhooks.list_deliveries(context.service, access.actor, access.course_id, limit + 1, cursor)
     return build_list_page(
-        [DeliveryShape.model_validate(each) for each in found], limit, lambda each: [each.made_at, each.id]
+        [DeliveryShape.model_validate(each) for each in lines], limit, lambda each: [each.made_at, each.id]
     )

@@ -17,6 +17,6 @@ def show_api(request: Request, reader: OptionalReader) -> Response:
     subjects: dict[str, list[tuple[str, str, str]]] = {}
     for path, operations in request.app.openapi()["paths"].items():
         for method, operation in operations.items():
-            told = (method.upper(), path, operation["description"])
-            subjects.setdefault(operation["tags"][0], []).append(told)
+            route = (method.upper(), path, operation["description"])
+            subjects.setdefault(operation["tags"][0], []).append(route)
     return render_page(request, reader, "api.html", subjects=subjects)

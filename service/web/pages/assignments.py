@@ -37,16 +37,16 @@ AssignmentId = Annotated[str, InPath(pattern="^[a-z0-9][a-z0-9_-]*$", max_length
 
 
 @router.get("/assignments")
-def list_assignments(request: Request, here: CourseInstructor, context: Context, done: DoneAction = "") -> Response:
+def list_assignments(request: Request, access: CourseInstructor, context: Context, done: DoneAction = "") -> Response:
     """Show the assignments of the course and the ways to add one."""
-    return _render_list(request, here, context, done=done)
+    return _render_list(request, access, context, done=done)
 
 
 @router.post("/assignments")
-def prepare(here: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
+def prepare(access: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=100)]) -> Response:
     """Add an assignment from the catalogue in its current version."""
     return _redirect_to_assignment(
-        here, assignment_uploads.prepare_from_catalogue(context.service, here.actor, here.course_id, assignment)
+        access, assignment_uploads.prepare_from_catalogue(context.service, access.actor, access.course_id, assignment)
     )
 
 
@@ -54,58 +54,60 @@ def prepare(here: CourseInstructor, context: Context, assignment: Annotated[str,
 @takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
 def upload(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     file: Annotated[UploadFile, File()],
     replace: Annotated[bool, Form()] = False,
 ) -> Response:
     """Add an assignment from an uploaded zip of its folder, and grade its reference solution as a preview."""
-    sent = UploadedFile(file.filename or "", file.file)
+    uploaded_file = UploadedFile(file.filename or "", file.file)
     try:
-        if not sent.flat_name.lower().endswith(".zip"):
+        if not uploaded_file.flat_name.lower().endswith(".zip"):
             raise UsageError(f"expected a .zip of an assignment's folder, with its {FILE_NAME}")
         with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
-            path = Path(folder) / clean_file_name(sent)
+            path = Path(folder) / clean_file_name(uploaded_file)
             with path.open("xb") as sink:
-                shutil.copyfileobj(sent.stream, sink)
-            asked = UploadRequest(path, replace)
+                shutil.copyfileobj(uploaded_file.stream, sink)
+            upload_request = UploadRequest(path, replace)
             return _redirect_to_assignment(
-                here, assignment_uploads.upload(context.service, here.actor, here.course_id, asked)
+                access, assignment_uploads.upload(context.service, access.actor, access.course_id, upload_request)
             )
     except UsageError as error:
-        asks, told = (
+        asks_to_replace, messages = (
             isinstance(error, AssignmentAlreadySeen),
             detect_language(request).translate_sentence(error.message).splitlines(),
         )
-        return _render_list(request, here, context, refused=told, asks_to_replace=asks, status_code=422)
+        return _render_list(
+            request, access, context, rejection=messages, asks_to_replace=asks_to_replace, status_code=422
+        )
 
 
 @router.get("/assignments/uploads")
-def redirect_to_list(here: CourseInstructor) -> Response:
+def redirect_to_list(access: CourseInstructor) -> Response:
     """Redirect to the list, for readers who open the upload address in the browser."""
-    return RedirectResponse(_build_path(here, ""), 303)
+    return RedirectResponse(_build_path(access, ""), 303)
 
 
 @router.get("/assignments/uploads/my-assignment.zip")
-def download_example(here: CourseInstructor) -> Response:
+def download_example(access: CourseInstructor) -> Response:
     """Return the folder of a commented example assignment as a zip."""
     with tempfile.TemporaryDirectory(prefix="robomark-assignment-") as folder:
         create_assignment(Path(folder) / "zip" / "my-assignment")
-        zipped = shutil.make_archive(f"{folder}/made", "zip", f"{folder}/zip")
-        return respond_with_attachment(Path(zipped).read_bytes(), "my-assignment.zip", "application/zip")
+        archive_path = shutil.make_archive(f"{folder}/made", "zip", f"{folder}/zip")
+        return respond_with_attachment(Path(archive_path).read_bytes(), "my-assignment.zip", "application/zip")
 
 
 @router.get("/assignments/{assignment}")
 def show_assignment(
-    request: Request, here: CourseInstructor, context: Context, assignment: AssignmentId, done: DoneAction = ""
+    request: Request, access: CourseInstructor, context: Context, assignment: AssignmentId, done: DoneAction = ""
 ) -> Response:
     """Show an assignment with its task, its state and its policy."""
-    view = assignment_views.show(context.service, here.actor, here.course_id, assignment)
+    view = assignment_views.show(context.service, access.actor, access.course_id, assignment)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "assignment.html",
-        here=here,
+        here=access,
         line=view.line,
         found=view.assignment,
         own_policy=view.own_policy,
@@ -119,46 +121,48 @@ def show_assignment(
 
 
 @router.post("/assignments/{assignment}/open")
-def open_assignment(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
+def open_assignment(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Open an assignment: students see it and can submit to it."""
     return _redirect_to_assignment(
-        here, assignments.open_for_students(context.service, here.actor, here.course_id, assignment)
+        access, assignments.open_for_students(context.service, access.actor, access.course_id, assignment)
     )
 
 
 @router.post("/assignments/{assignment}/close")
-def close_assignment(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
+def close_assignment(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Close an assignment: students can no longer submit to it."""
-    return _redirect_to_assignment(here, assignments.close(context.service, here.actor, here.course_id, assignment))
+    return _redirect_to_assignment(
+        access, assignments.close(context.service, access.actor, access.course_id, assignment)
+    )
 
 
 @router.post("/assignments/{assignment}/remove")
-def remove(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
+def remove(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Remove an assignment that no student has seen from the course."""
-    assignments.remove(context.service, here.actor, here.course_id, assignment)
-    return RedirectResponse(_build_path(here, ""), 303)
+    assignments.remove(context.service, access.actor, access.course_id, assignment)
+    return RedirectResponse(_build_path(access, ""), 303)
 
 
 @router.post("/assignments/{assignment}/names")
 def hide_names(
-    here: CourseInstructor, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
+    access: CourseInstructor, context: Context, assignment: AssignmentId, hidden: Annotated[bool, Form()] = False
 ) -> Response:
     """Hide or show the students' names for all instructors of the course."""
     return _redirect_to_assignment(
-        here, assignments.hide_names(context.service, here.actor, here.course_id, assignment, hidden=hidden)
+        access, assignments.hide_names(context.service, access.actor, access.course_id, assignment, names_hidden=hidden)
     )
 
 
 @router.post("/assignments/{assignment}/preview")
-def preview(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
+def preview(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Grade the catalogue's reference solution as the instructor's own submission."""
-    job_id = assignment_uploads.preview(context.service, here.actor, here.course_id, assignment)
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
+    job_id = assignment_uploads.preview(context.service, access.actor, access.course_id, assignment)
+    return RedirectResponse(f"/courses/{access.course_id}/grades/{job_id}", 303)
 
 
 @router.post("/policy")
 def set_policy(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     assignment: Annotated[str, Form(max_length=100)] = "",
     due: Annotated[str, Form(max_length=40)] = "",
@@ -167,49 +171,49 @@ def set_policy(
     cool_down: Annotated[float, Form(ge=0, le=10_000)] = 0.0,
 ) -> Response:
     """Set deadline and attempts for one assignment, or the default for assignments without a policy."""
-    allowed = PolicyLimits(parse_date_time(due), late_days, int(attempts) if attempts else None, cool_down * 60)
-    policies.set_policy(context.service, here.actor, here.course_id, assignment, allowed)
-    return RedirectResponse(f"{_build_path(here, assignment)}?done=policy", 303)
+    policy_limits = PolicyLimits(parse_date_time(due), late_days, int(attempts) if attempts else None, cool_down * 60)
+    policies.set_policy(context.service, access.actor, access.course_id, assignment, policy_limits)
+    return RedirectResponse(f"{_build_path(access, assignment)}?done=policy", 303)
 
 
 @router.post("/assignments/{assignment}/no-policy")
-def drop_policy(here: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
+def drop_policy(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Delete an assignment's own policy, so that the course's default applies."""
-    policies.drop_policy(context.service, here.actor, here.course_id, assignment)
-    return RedirectResponse(f"{_build_path(here, assignment)}?done=policy", 303)
+    policies.drop_policy(context.service, access.actor, access.course_id, assignment)
+    return RedirectResponse(f"{_build_path(access, assignment)}?done=policy", 303)
 
 
 def _render_list(
     request: Request,
-    here: ReaderInCourse,
+    access: ReaderInCourse,
     context: WebContext,
     *,
     done: str = "",
-    refused: list[str] | None = None,
+    rejection: list[str] | None = None,
     asks_to_replace: bool = False,
     status_code: int = 200,
 ) -> Response:
-    view = assignment_views.show_all(context.service, here.actor, here.course_id)
+    view = assignment_views.show_all(context.service, access.actor, access.course_id)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "assignments.html",
         status_code=status_code,
-        here=here,
+        here=access,
         prepared=view.prepared,
         catalogue=len(list_catalogue_ids()),
         policies=view.policies,
         policy=view.policy,
-        refused=refused or [],
+        refused=rejection or [],
         asks_to_replace=asks_to_replace,
         done=done,
         at=datetime.now(UTC),
     )
 
 
-def _redirect_to_assignment(here: ReaderInCourse, made: CourseAssignment) -> Response:
-    return RedirectResponse(_build_path(here, made.assignment), 303)
+def _redirect_to_assignment(access: ReaderInCourse, course_assignment: CourseAssignment) -> Response:
+    return RedirectResponse(_build_path(access, course_assignment.assignment), 303)
 
 
-def _build_path(here: ReaderInCourse, assignment: str) -> str:
-    return f"/courses/{here.course_id}/assignments{f'/{assignment}' if assignment else ''}"
+def _build_path(access: ReaderInCourse, assignment: str) -> str:
+    return f"/courses/{access.course_id}/assignments{f'/{assignment}' if assignment else ''}"

@@ -68,7 +68,7 @@ _ACTIONS = {
 @router.get("")
 def show_submissions(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     state: Annotated[str, Query(max_length=20)] = "",
@@ -79,19 +79,21 @@ def show_submissions(
 ) -> Response:
     """Show the submissions of a batch. The table can be sorted, filtered, searched and paged."""
     column = sort.removeprefix("-")
-    asked = TableRequest(
+    table_request = TableRequest(
         state if state in STATES else "", q, column if column in SORTS else "student", sort.startswith("-"), number
     )
-    view, shown = _load_batch(here, context, batch_id)
-    table, remarked = views.show_table_page(context.service, here.actor, here.course_id, view.lines, asked)
+    view, page_context = _load_batch(access, context, batch_id)
+    table, review_counts = views.show_table_page(
+        context.service, access.actor, access.course_id, view.lines, table_request
+    )
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "batch_table.html",
-        **shown,
+        **page_context,
         table=table,
-        asked=asked,
-        remarked=remarked,
+        asked=table_request,
+        remarked=review_counts,
         columns=_choose_columns(view.lines),
         verdicts={each.value: describe_verdict(each, detect_language(request)).short for each in Verdict},
         entry=next((each for each in view.history if each.action == done in _ACTIONS), None),
@@ -100,14 +102,16 @@ def show_submissions(
 
 
 @router.get("/progress")
-def show_progress(request: Request, here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def show_progress(request: Request, access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Return the part of the page that shows the progress.
 
     The page requests it repeatedly until the batch is finished.
     """
-    far = _build_progress_context(here, views.show_progress(context.service, here.actor, here.course_id, batch_id))
-    answer = render_page(request, here.reader, "batch_progress.html", **far)
-    if not far["goes_on"]:
+    progress_context = _build_progress_context(
+        access, views.show_progress(context.service, access.actor, access.course_id, batch_id)
+    )
+    answer = render_page(request, access.reader, "batch_progress.html", **progress_context)
+    if not progress_context["goes_on"]:
         answer.headers["hx-refresh"] = "true"
     return answer
 
@@ -115,22 +119,24 @@ def show_progress(request: Request, here: CourseInstructor, context: Context, ba
 @router.get("/overview")
 def show_overview(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     at_least: Annotated[int, Query(alias="pass", ge=0, le=100)] = int(PASS_SHARE * 100),
 ) -> Response:
     """Show the results of a batch: marks, criteria, causes, students to review and missing students."""
-    table, shown = _load_batch(here, context, batch_id)
-    found = views.show_overview_of_table(context.service, here.actor, here.course_id, table, Decimal(at_least) / 100)
-    lines = found.lines
+    table_view, page_context = _load_batch(access, context, batch_id)
+    overview = views.show_overview_of_table(
+        context.service, access.actor, access.course_id, table_view, Decimal(at_least) / 100
+    )
+    lines = overview.lines
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "batch_overview.html",
-        **shown,
-        classes=found.classes,
-        missing=found.missing,
+        **page_context,
+        classes=overview.classes,
+        missing=overview.missing,
         at_least=at_least,
         by_id={line.id: line for line in lines if line.id},
         job_of={(line.assignment, line.student): line.id for line in lines if line.id},
@@ -141,91 +147,95 @@ def show_overview(
 @router.get("/changes")
 def show_changes(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
 ) -> Response:
     """Show the changes by a regrade, with reasons."""
-    _, shown = _load_batch(here, context, batch_id)
-    found = views.show_changes_page(context.service, here.actor, here.course_id, batch_id, number)
-    return render_page(request, here.reader, "batch_changes.html", **shown, found=found, changes=found.changes)
+    _, page_context = _load_batch(access, context, batch_id)
+    changes_page = views.show_changes_page(context.service, access.actor, access.course_id, batch_id, number)
+    return render_page(
+        request, access.reader, "batch_changes.html", **page_context, found=changes_page, changes=changes_page.changes
+    )
 
 
 @router.post("/pause")
-def pause(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def pause(access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Pause a batch."""
-    operations.pause(context.service, here.actor, here.course_id, batch_id)
-    return _redirect_to_batch(here, batch_id, "pause")
+    operations.pause(context.service, access.actor, access.course_id, batch_id)
+    return _redirect_to_batch(access, batch_id, "pause")
 
 
 @router.post("/resume")
-def resume(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def resume(access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Resume a paused batch."""
-    operations.resume(context.service, here.actor, here.course_id, batch_id)
-    return _redirect_to_batch(here, batch_id, "resume")
+    operations.resume(context.service, access.actor, access.course_id, batch_id)
+    return _redirect_to_batch(access, batch_id, "resume")
 
 
 @router.post("/cancel")
-def cancel(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def cancel(access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Cancel the jobs of a batch that are not finished."""
-    operations.cancel(context.service, here.actor, here.course_id, batch_id)
-    return _redirect_to_batch(here, batch_id, "cancel")
+    operations.cancel(context.service, access.actor, access.course_id, batch_id)
+    return _redirect_to_batch(access, batch_id, "cancel")
 
 
 @router.post("/retry")
-def retry(here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def retry(access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Requeue the failed jobs of a batch."""
-    operations.retry(context.service, here.actor, here.course_id, batch_id)
-    return _redirect_to_batch(here, batch_id, "retry")
+    operations.retry(context.service, access.actor, access.course_id, batch_id)
+    return _redirect_to_batch(access, batch_id, "retry")
 
 
 @router.get("/publish")
-def preview_publication(request: Request, here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def preview_publication(request: Request, access: CourseInstructor, context: Context, batch_id: RowName) -> Response:
     """Show how many grades publishing would release and hold back."""
-    _, shown = _load_batch(here, context, batch_id)
-    publication = regrade_operations.preview_publication(context.service, here.actor, here.course_id, batch_id)
-    return render_page(request, here.reader, "batch_publish.html", **shown, publication=publication)
+    _, page_context = _load_batch(access, context, batch_id)
+    publication = regrade_operations.preview_publication(context.service, access.actor, access.course_id, batch_id)
+    return render_page(request, access.reader, "batch_publish.html", **page_context, publication=publication)
 
 
 @router.post("/publish")
 def publish(
-    here: CourseInstructor, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
+    access: CourseInstructor, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Make the newest grades of a batch the current grades, and release them to the students."""
-    regrade_operations.publish(context.service, here.actor, here.course_id, batch_id, anyway=anyway)
-    return _redirect_to_batch(here, batch_id, "publish")
+    regrade_operations.publish(context.service, access.actor, access.course_id, batch_id, includes_unjudged=anyway)
+    return _redirect_to_batch(access, batch_id, "publish")
 
 
 @router.post("/regrade")
 def regrade(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     assignment: Annotated[str, Form(max_length=100)] = "",
 ) -> Response:
     """Regrade a batch, against the course's current assignment or the one used before."""
-    made = regrade_operations.regrade_batch(context.service, here.actor, here.course_id, batch_id, assignment)
-    return RedirectResponse(f"/courses/{here.course_id}/batches/{made.batch_id}/changes", 303)
+    regrade_batch = regrade_operations.regrade_batch(
+        context.service, access.actor, access.course_id, batch_id, assignment
+    )
+    return RedirectResponse(f"/courses/{access.course_id}/batches/{regrade_batch.batch_id}/changes", 303)
 
 
-def _redirect_to_batch(here: ReaderInCourse, batch_id: str, done: str) -> Response:
-    return RedirectResponse(f"/courses/{here.course_id}/batches/{batch_id}?done={done}", 303)
+def _redirect_to_batch(access: ReaderInCourse, batch_id: str, action: str) -> Response:
+    return RedirectResponse(f"/courses/{access.course_id}/batches/{batch_id}?done={action}", 303)
 
 
-def _load_batch(here: ReaderInCourse, context: WebContext, batch_id: str) -> tuple[TableView, dict[str, Any]]:
+def _load_batch(access: ReaderInCourse, context: WebContext, batch_id: str) -> tuple[TableView, dict[str, Any]]:
     """Return the table of a batch and the template variables that all its pages need."""
-    found = views.show_table(context.service, here.actor, here.course_id, batch_id)
-    graded = [each for each in found.lines if views.is_graded(each)]
-    return found, {
-        "lines": found.lines,
-        "assignments": sorted({each.assignment for each in found.lines if each.id}),
-        "nameless": found.has_hidden_names,
-        "waiting_regrades": found.waiting_regrades,
-        "history": found.history,
-        "to_publish": sum(each.published_at is None for each in graded),
+    table_view = views.show_table(context.service, access.actor, access.course_id, batch_id)
+    graded_lines = [each for each in table_view.lines if views.is_graded(each)]
+    return table_view, {
+        "lines": table_view.lines,
+        "assignments": sorted({each.assignment for each in table_view.lines if each.id}),
+        "nameless": table_view.has_hidden_names,
+        "waiting_regrades": table_view.waiting_regrades,
+        "history": table_view.history,
+        "to_publish": sum(each.published_at is None for each in graded_lines),
         "actions": _ACTIONS,
-        **_build_progress_context(here, found.view),
+        **_build_progress_context(access, table_view.view),
     }
 
 
@@ -234,16 +244,16 @@ def _count_states(line: BatchLine) -> dict[str, int]:
     return {state: count for state, count in counts.items() if count}
 
 
-def _build_progress_context(here: ReaderInCourse, view: BatchView) -> dict[str, Any]:
-    line, far = view.batch, view.progress
+def _build_progress_context(access: ReaderInCourse, view: BatchView) -> dict[str, Any]:
+    line, progress = view.batch, view.progress
     return {
-        "here": here,
+        "here": access,
         "batch": line,
-        "far": far,
-        "share": round(100 * min(1.0, (far.ended + far.partial) / far.jobs)) if far.jobs else 100,
+        "far": progress,
+        "share": round(100 * min(1.0, (progress.ended + progress.partial) / progress.jobs)) if progress.jobs else 100,
         "pace": view.pace,
-        "goes_on": far.ended < far.jobs,
-        "path": f"/courses/{here.course_id}/batches/{line.id}",
+        "goes_on": progress.ended < progress.jobs,
+        "path": f"/courses/{access.course_id}/batches/{line.id}",
         "counts": _count_states(line),
         "states": _STATES,
         "BatchState": BatchState,
@@ -252,7 +262,7 @@ def _build_progress_context(here: ReaderInCourse, view: BatchView) -> dict[str, 
 
 def _choose_columns(lines: Sequence[TableLine]) -> dict[str, str]:
     """Return the titles of the columns with useful data, by sort key."""
-    several = len({line.assignment for line in lines}) > 1
-    named = any(line.name not in ("", line.student) for line in lines)
-    dropped = ({"assignment"} if not several else set()) | ({"name"} if not named else set())
-    return {key: title for key, title in _COLUMNS.items() if key not in dropped}
+    has_assignments = len({line.assignment for line in lines}) > 1
+    has_names = any(line.name not in ("", line.student) for line in lines)
+    hidden_columns = ({"assignment"} if not has_assignments else set()) | ({"name"} if not has_names else set())
+    return {key: title for key, title in _COLUMNS.items() if key not in hidden_columns}

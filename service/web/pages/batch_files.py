@@ -27,20 +27,20 @@ _WORKSHEET = "moodle-worksheet"
 
 @router.get("/export")
 def export(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     form: Annotated[str, Query(alias="format", max_length=40)] = "csv",
     published: Annotated[bool, Query()] = False,
 ) -> Response:
     """Return the current grades in the requested format."""
-    return _respond_with_export(here, context, batch_id, ExportRequest(form, published))
+    return _respond_with_export(access, context, batch_id, ExportRequest(form, published))
 
 
 @router.post("/worksheet")
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 def fill_worksheet(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     batch_id: RowName,
     file: Annotated[UploadFile, File()],
@@ -48,14 +48,16 @@ def fill_worksheet(
 ) -> Response:
     """Return Moodle's grading worksheet with the grades filled in."""
     try:
-        given = file.file.read().decode("utf-8")
+        content = file.file.read().decode("utf-8")
     except UnicodeDecodeError:
         raise UsageError("the worksheet is not in UTF-8; upload the original file from Moodle") from None
-    return _respond_with_export(here, context, batch_id, ExportRequest(_WORKSHEET, published, given))
+    return _respond_with_export(access, context, batch_id, ExportRequest(_WORKSHEET, published, content))
 
 
-def _respond_with_export(here: ReaderInCourse, context: WebContext, batch_id: str, asked: ExportRequest) -> Response:
-    made = download(context.service, here.actor, here.course_id, batch_id, asked)
+def _respond_with_export(
+    access: ReaderInCourse, context: WebContext, batch_id: str, export_request: ExportRequest
+) -> Response:
+    exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
     # Excel recognises UTF-8 only by a byte order mark. Moodle's worksheet stays as Moodle wrote it.
-    mark = codecs.BOM_UTF8 if asked.form in _TABLES else b""
-    return respond_with_attachment(mark + made.data, made.name, made.media_type)
+    byte_order_mark = codecs.BOM_UTF8 if export_request.form in _TABLES else b""
+    return respond_with_attachment(byte_order_mark + exported.data, exported.name, exported.media_type)

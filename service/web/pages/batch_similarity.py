@@ -21,15 +21,26 @@ _MOST_SHOWN = 30
 
 
 @router.get("/similar")
-def show_similar_submissions(request: Request, here: CourseInstructor, context: Context, batch_id: RowName) -> Response:
+def show_similar_submissions(
+    request: Request, access: CourseInstructor, context: Context, batch_id: RowName
+) -> Response:
     """Show pairs of students with similar newest submissions, and the evidence side by side."""
-    found = show_similar(context.service, here.actor, here.course_id, batch_id)
+    compared_batch = show_similar(context.service, access.actor, access.course_id, batch_id)
     body = None
-    if found.found is not None:
-        links = {(each.assignment, each.student): f"/courses/{here.course_id}/grades/{each.id}" for each in found.lines}
-        view = build_similarity_view(found.found, detect_language(request))
-        body = render_similarity_body(view, found.source, _MOST_SHOWN, links)
-    compared = len(found.lines)
+    if compared_batch.found is not None:
+        links = {
+            (each.assignment, each.student): f"/courses/{access.course_id}/grades/{each.id}"
+            for each in compared_batch.lines
+        }
+        view = build_similarity_view(compared_batch.found, detect_language(request))
+        body = render_similarity_body(view, compared_batch.source, _MOST_SHOWN, links)
+    submission_count = len(compared_batch.lines)
     return render_page(
-        request, here.reader, "batch_similar.html", here=here, batch=found.batch, body=body, compared=compared
+        request,
+        access.reader,
+        "batch_similar.html",
+        here=access,
+        batch=compared_batch.batch,
+        body=body,
+        compared=submission_count,
     )

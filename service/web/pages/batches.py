@@ -41,133 +41,136 @@ _SUBMISSION_SUFFIXES = (".zip", ".py", ".ipynb")
 
 
 @router.get("")
-def list_batches(request: Request, here: CourseInstructor, context: Context, after: RowNameAfter = "") -> Response:
+def list_batches(request: Request, access: CourseInstructor, context: Context, after: RowNameAfter = "") -> Response:
     """Show the batches of the course, newest first, and a form for a new one."""
-    return _render_list(request, here, context, after=after)
+    return _render_list(request, access, context, last_id=after)
 
 
 @router.post("/uploads")
 @takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
 def upload(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     files: Annotated[list[UploadFile], File()],
     people: Annotated[UploadFile | None, File()] = None,
     assignment: Annotated[str, Form(max_length=100)] = "",
 ) -> Response:
     """Save the uploaded files and determine which submissions would be accepted."""
-    kept_uploads = PendingUploads(context.settings.home)
-    begun = kept_uploads.begin(here.reader.identity.person_id, here.course_id, assignment)
+    pending_uploads = PendingUploads(context.settings.home)
+    pending_upload = pending_uploads.begin(access.reader.identity.person_id, access.course_id, assignment)
     try:
-        laid = _store_files(
-            kept_uploads, begun, _list_sent_files(files), _list_sent_files([people] if people is not None else [])
+        stored_upload = _store_files(
+            pending_uploads,
+            pending_upload,
+            _list_sent_files(files),
+            _list_sent_files([people] if people is not None else []),
         )
-        checked = _read_contents(context, here, laid)
-        expected = _build_expected_submissions(
-            operations.preview_submissions(context.service, here.actor, here.course_id, checked)
+        contents = _read_contents(context, access, stored_upload)
+        expected_submissions = _build_expected_submissions(
+            operations.preview_submissions(context.service, access.actor, access.course_id, contents)
         )
-        kept_uploads.write(replace(laid, expected=expected, refusals=checked.refusals))
+        pending_uploads.write(replace(stored_upload, expected=expected_submissions, refusals=contents.refusals))
     except UsageError as error:
-        kept_uploads.remove(begun)
-        return _render_list(request, here, context, refused=str(error), status_code=422)
-    return RedirectResponse(f"/courses/{here.course_id}/batches/uploads/{laid.id}", 303)
+        pending_uploads.remove(pending_upload)
+        return _render_list(request, access, context, rejection=str(error), status_code=422)
+    return RedirectResponse(f"/courses/{access.course_id}/batches/uploads/{stored_upload.id}", 303)
 
 
 @router.get("/uploads/{upload_id}")
-def show_upload(request: Request, here: CourseInstructor, context: Context, upload_id: RowName) -> Response:
+def show_upload(request: Request, access: CourseInstructor, context: Context, upload_id: RowName) -> Response:
     """Show the accepted and rejected submissions of an upload, before it is confirmed."""
-    found = _require_upload(context, here, upload_id)
+    pending_upload = _require_upload(context, access, upload_id)
     missing: dict[str, list[str]] = {}
-    for each in found.expected:
-        if each.missing:
-            missing.setdefault(each.missing, []).append(each.student)
+    for submission in pending_upload.expected:
+        if submission.missing:
+            missing.setdefault(submission.missing, []).append(submission.student)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "upload.html",
-        here=here,
-        upload=found,
+        here=access,
+        upload=pending_upload,
         known=None,
         missing=missing,
-        strangers=[each.student for each in found.expected if not each.enrolled],
-        known_before=sum(each.known for each in found.expected),
-        copied=sum(each.copied for each in found.expected),
+        strangers=[each.student for each in pending_upload.expected if not each.enrolled],
+        known_before=sum(each.known for each in pending_upload.expected),
+        copied=sum(each.copied for each in pending_upload.expected),
     )
 
 
 @router.post("/uploads/{upload_id}/confirm")
 def confirm(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     upload_id: RowName,
     again: Annotated[bool, Form()] = False,
 ) -> Response:
     """Create a batch from an upload."""
-    found = _require_upload(context, here, upload_id)
-    asked = SubmitRequest(found.name, _read_contents(context, here, found), again)
-    done = operations.submit(context.service, here.actor, here.course_id, asked)
-    PendingUploads(context.settings.home).remove(found)
-    if done.batch is None:
-        known = sorted((each.student, each.job_id) for each in done.known)
-        return render_page(request, here.reader, "upload.html", here=here, upload=found, known=known)
-    return RedirectResponse(f"/courses/{here.course_id}/batches/{done.batch.id}?done=submit", 303)
+    pending_upload = _require_upload(context, access, upload_id)
+    submit_request = SubmitRequest(pending_upload.name, _read_contents(context, access, pending_upload), again)
+    submitted_batch = operations.submit(context.service, access.actor, access.course_id, submit_request)
+    PendingUploads(context.settings.home).remove(pending_upload)
+    if submitted_batch.batch is None:
+        known_jobs = sorted((each.student, each.job_id) for each in submitted_batch.known)
+        return render_page(request, access.reader, "upload.html", here=access, upload=pending_upload, known=known_jobs)
+    return RedirectResponse(f"/courses/{access.course_id}/batches/{submitted_batch.batch.id}?done=submit", 303)
 
 
 @router.post("/uploads/{upload_id}/discard")
-def discard(here: CourseInstructor, context: Context, upload_id: RowName) -> Response:
+def discard(access: CourseInstructor, context: Context, upload_id: RowName) -> Response:
     """Discard an upload."""
-    PendingUploads(context.settings.home).remove(_require_upload(context, here, upload_id))
-    return RedirectResponse(f"/courses/{here.course_id}/batches", 303)
+    PendingUploads(context.settings.home).remove(_require_upload(context, access, upload_id))
+    return RedirectResponse(f"/courses/{access.course_id}/batches", 303)
 
 
 def _render_list(
     request: Request,
-    here: ReaderInCourse,
+    access: ReaderInCourse,
     context: WebContext,
     *,
-    after: str = "",
-    refused: str = "",
+    last_id: str = "",
+    rejection: str = "",
     status_code: int = 200,
 ) -> Response:
-    shown = views.list_batches_page(context.service, here.actor, here.course_id, after)
-    own = {each.assignment for each in shown.prepared}
+    page = views.list_batches_page(context.service, access.actor, access.course_id, last_id)
+    prepared_ids = {each.assignment for each in page.prepared}
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "batches.html",
         status_code=status_code,
-        here=here,
-        batches=shown.batches,
-        older=shown.older,
-        unfinished=any(line.unfinished for line in shown.batches),
-        prepared=shown.prepared,
-        catalogue=[each for each in list_catalogue_ids() if each not in own],
-        refused=refused,
-        waiting=PendingUploads(context.settings.home).list_waiting(here.reader.identity.person_id, here.course_id),
+        here=access,
+        batches=page.batches,
+        older=page.older,
+        unfinished=any(line.unfinished for line in page.batches),
+        prepared=page.prepared,
+        catalogue=[each for each in list_catalogue_ids() if each not in prepared_ids],
+        refused=rejection,
+        waiting=PendingUploads(context.settings.home).list_waiting(access.reader.identity.person_id, access.course_id),
     )
 
 
-def _build_expected_submissions(foreseen: Sequence[SubmissionPreview]) -> tuple[ExpectedSubmission, ...]:
-    found = []
-    for each in foreseen:
-        asked, ahead = each.request, each.intake_preview
-        part = find_missing_part(asked.submission, asked.assignment.parts)
-        found.append(
+def _build_expected_submissions(previews: Sequence[SubmissionPreview]) -> tuple[ExpectedSubmission, ...]:
+    submissions = []
+    for preview in previews:
+        grading_request, intake_preview = preview.request, preview.intake_preview
+        missing_part = find_missing_part(grading_request.submission, grading_request.assignment.parts)
+        submissions.append(
             ExpectedSubmission(
-                asked.submission.student,
-                each.name,
-                asked.assignment.title,
-                asked.source,
-                PART_FILES[part] if part is not None else "",
-                ahead.enrolled,
-                ahead.known,
-                ahead.copied,
-                next(iter(find_empty_parts(asked.submission)), ""),
+                grading_request.submission.student,
+                preview.name,
+                grading_request.assignment.title,
+                grading_request.source,
+                PART_FILES[missing_part] if missing_part is not None else "",
+                intake_preview.enrolled,
+                intake_preview.known,
+                intake_preview.copied,
+                next(iter(find_empty_parts(grading_request.submission)), ""),
             )
         )
-    return tuple(found)
+    return tuple(submissions)
 
 
 def _list_sent_files(files: list[UploadFile]) -> list[UploadedFile]:
@@ -176,45 +179,51 @@ def _list_sent_files(files: list[UploadFile]) -> list[UploadedFile]:
 
 
 def _store_files(
-    kept_uploads: PendingUploads, begun: PendingUpload, files: list[UploadedFile], people: list[UploadedFile]
+    pending_uploads: PendingUploads,
+    pending_upload: PendingUpload,
+    files: list[UploadedFile],
+    people: list[UploadedFile],
 ) -> PendingUpload:
     """Store the files in the upload and return it with their names. Raises UsageError for unsuitable files."""
     if not files:
         raise UsageError("no files were uploaded, expected a .zip, or a file for each student")
     suffixes = {Path(file.flat_name).suffix.lower() for file in files}
     if not suffixes <= set(_SUBMISSION_SUFFIXES):
-        wrong = next(
+        unsupported_name = next(
             file.flat_name for file in files if Path(file.flat_name).suffix.lower() not in _SUBMISSION_SUFFIXES
         )
         raise UsageError(
-            f"{sanitise_name(wrong)} was uploaded, expected a .zip, or a .py, .ipynb or .zip for each student"
+            f"{sanitise_name(unsupported_name)} was uploaded, expected a .zip, or a .py, .ipynb or .zip for each "
+            "student"
         )
-    names = kept_uploads.store_files(begun, files, "batch")
-    one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVE_SUFFIXES)
-    table = kept_uploads.store_files(begun, people, "people") if people else [""]
-    if one_archive:
-        called = Path(names[0]).stem
+    names = pending_uploads.store_files(pending_upload, files, "batch")
+    is_one_archive = len(names) == 1 and names[0].lower().endswith(_ARCHIVE_SUFFIXES)
+    table = pending_uploads.store_files(pending_upload, people, "people") if people else [""]
+    if is_one_archive:
+        upload_name = Path(names[0]).stem
     else:
-        called = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
-    return replace(begun, name=sanitise_name(called), file=names[0] if one_archive else "", people=table[0])
+        upload_name = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    return replace(
+        pending_upload, name=sanitise_name(upload_name), file=names[0] if is_one_archive else "", people=table[0]
+    )
 
 
-def _read_contents(context: WebContext, here: ReaderInCourse, upload: PendingUpload) -> BatchContents:
-    kept_uploads = PendingUploads(context.settings.home)
-    table = kept_uploads.people_path(upload)
+def _read_contents(context: WebContext, access: ReaderInCourse, upload: PendingUpload) -> BatchContents:
+    pending_uploads = PendingUploads(context.settings.home)
+    table = pending_uploads.people_path(upload)
     people = None if table is None else read_people(table)
-    submissions = kept_uploads.submissions_path(upload)
-    return read_upload(context, here.actor, upload.course_id, submissions, upload.assignment, people)
+    submissions = pending_uploads.submissions_path(upload)
+    return read_upload(context, access.actor, upload.course_id, submissions, upload.assignment, people)
 
 
-def _require_upload(context: WebContext, here: ReaderInCourse, upload_id: str) -> PendingUpload:
-    kept_uploads = PendingUploads(context.settings.home)
-    found = kept_uploads.find(upload_id, here.reader.identity.person_id, here.course_id)
-    if found is None:
+def _require_upload(context: WebContext, access: ReaderInCourse, upload_id: str) -> PendingUpload:
+    pending_uploads = PendingUploads(context.settings.home)
+    pending_upload = pending_uploads.find(upload_id, access.reader.identity.person_id, access.course_id)
+    if pending_upload is None:
         raise HTTPException(
             404,
             translatable(
                 "This upload no longer exists. It was confirmed, discarded or removed, or it is more than a day old."
             ),
         )
-    return found
+    return pending_upload

@@ -22,24 +22,24 @@ router = APIRouter()
 @router.get("/courses/{course_id}/catalogue")
 def search_catalogue(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     q: Annotated[str, Query(max_length=100)] = "",
     topic: Annotated[str, Query(max_length=10)] = "",
 ) -> Response:
     """Show the catalogue's assignments that have the topic and contain all searched words."""
-    taken = assignment_views.list_prepared(context.service, here.actor, here.course_id)
-    everything = [read_overview(locate_assignment_folder(each)) for each in list_catalogue_ids()]
-    found = [each for each in everything if each.matches_text(q) and topic in ("", each.topic or "none")]
+    course_assignments = assignment_views.list_prepared(context.service, access.actor, access.course_id)
+    overviews = [read_overview(locate_assignment_folder(each)) for each in list_catalogue_ids()]
+    matching_overviews = [each for each in overviews if each.matches_text(q) and topic in ("", each.topic or "none")]
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "catalogue.html",
-        here=here,
-        found=sorted(found, key=lambda each: (each.topic == "", each.section, each.title)),
-        everything=len(everything),
-        topics={number: TOPICS[number] for number in sorted({each.topic for each in everything if each.topic})},
-        prepared={each.assignment for each in taken},
+        here=access,
+        found=sorted(matching_overviews, key=lambda each: (each.topic == "", each.section, each.title)),
+        everything=len(overviews),
+        topics={number: TOPICS[number] for number in sorted({each.topic for each in overviews if each.topic})},
+        prepared={each.assignment for each in course_assignments},
         text=q,
         topic=topic,
     )
@@ -47,10 +47,12 @@ def search_catalogue(
 
 @router.get("/courses/{course_id}/catalogue/{assignment}")
 def show_catalogue_entry(
-    request: Request, here: CourseInstructor, context: Context, assignment: Annotated[str, InPath(max_length=100)]
+    request: Request, access: CourseInstructor, context: Context, assignment: Annotated[str, InPath(max_length=100)]
 ) -> Response:
     """Show the task of a catalogue assignment before it is added to the course."""
-    found = find_in_catalogue(assignment)
-    prepared = assignment_views.list_prepared(context.service, here.actor, here.course_id)
-    taken = found.id in {each.assignment for each in prepared}
-    return render_page(request, here.reader, "catalogue_entry.html", here=here, found=found, in_course=taken)
+    catalogue_assignment = find_in_catalogue(assignment)
+    course_assignments = assignment_views.list_prepared(context.service, access.actor, access.course_id)
+    is_in_course = catalogue_assignment.id in {each.assignment for each in course_assignments}
+    return render_page(
+        request, access.reader, "catalogue_entry.html", here=access, found=catalogue_assignment, in_course=is_in_course
+    )

@@ -20,52 +20,54 @@ router = APIRouter(prefix="/courses/{course_id}/grades/{job_id}")
 
 
 @router.get("")
-def show_grade(request: Request, here: CourseInstructor, context: Context, job_id: RowName, done: str = "") -> Response:
+def show_grade(
+    request: Request, access: CourseInstructor, context: Context, job_id: RowName, done: str = ""
+) -> Response:
     """Show the report of one submission, or the progress while it is being graded."""
-    asked = (context.service, here.actor, here.course_id, job_id)
-    if is_htmx_request(request) and grade_views.show_state(*asked).ended:
+    grade_key = (context.service, access.actor, access.course_id, job_id)
+    if is_htmx_request(request) and grade_views.show_state(*grade_key).ended:
         return Response(headers={"hx-refresh": "true"})
-    found = grade_views.show_grade(*asked, detect_language(request))
-    newest_first = list(reversed(found.history))
+    view = grade_views.show_grade(*grade_key, detect_language(request))
+    newest_first = list(reversed(view.history))
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "grade.html",
-        here=here,
-        line=found.line,
-        path=f"/courses/{here.course_id}/grades/{job_id}",
-        report=found.report,
-        change=found.change,
-        gradings=found.gradings,
-        attempts=found.attempts,
+        here=access,
+        line=view.line,
+        path=f"/courses/{access.course_id}/grades/{job_id}",
+        report=view.report,
+        change=view.change,
+        gradings=view.gradings,
+        attempts=view.attempts,
         history=newest_first,
-        beside=found.neighbours,
-        batch_id=found.batch_id,
-        put_aside=found.awaits_approval,
+        beside=view.neighbours,
+        batch_id=view.batch_id,
+        put_aside=view.awaits_approval,
         told=next((entry for entry in newest_first if entry.action == done == "publish"), None),
     )
 
 
 @router.post("/publish")
 def publish(
-    here: CourseInstructor, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False
+    access: CourseInstructor, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Make the newest grade of this submission the current grade, and release it to the student."""
-    regrades.publish_one(context.service, here.actor, here.course_id, job_id, anyway=anyway)
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}?done=publish", 303)
+    regrades.publish_one(context.service, access.actor, access.course_id, job_id, includes_unjudged=anyway)
+    return RedirectResponse(f"/courses/{access.course_id}/grades/{job_id}?done=publish", 303)
 
 
 @router.post("/regrade")
 def regrade(
-    here: CourseInstructor, context: Context, job_id: RowName, assignment: Annotated[str, Form(max_length=100)] = ""
+    access: CourseInstructor, context: Context, job_id: RowName, assignment: Annotated[str, Form(max_length=100)] = ""
 ) -> Response:
     """Regrade this submission, against the assignment's current version or the one used before."""
-    made = regrades.regrade_one(context.service, here.actor, here.course_id, job_id, assignment)
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{made}", 303)
+    new_job_id = regrades.regrade_one(context.service, access.actor, access.course_id, job_id, assignment)
+    return RedirectResponse(f"/courses/{access.course_id}/grades/{new_job_id}", 303)
 
 
 @router.post("/grade-over-limit")
-def grade_over_limit(here: CourseInstructor, context: Context, job_id: RowName) -> Response:
+def grade_over_limit(access: CourseInstructor, context: Context, job_id: RowName) -> Response:
     """Grade a submission that was not graded because it exceeds a limit."""
-    regrades.grade_over_limit(context.service, here.actor, here.course_id, job_id)
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}", 303)
+    regrades.grade_over_limit(context.service, access.actor, access.course_id, job_id)
+    return RedirectResponse(f"/courses/{access.course_id}/grades/{job_id}", 303)

@@ -27,26 +27,26 @@ TokenWord = Annotated[str, Query(max_length=64)]
 @router.get("/")
 def show_home(request: Request, reader: SignedInReader, context: Context) -> Response:
     """Show the reader's courses, or redirect to the only one."""
-    own = sorted(courses.list_own(context.service, reader.actor), key=lambda each: each.name)
-    if len(own) == 1 and not reader.identity.operator:
-        return RedirectResponse(build_course_path(own[0].id, own[0].role), 303)
-    listed = [(each.name, each.role, build_course_path(each.id, each.role)) for each in own]
-    return render_page(request, reader, "home.html", courses=listed)
+    own_courses = sorted(courses.list_own(context.service, reader.actor), key=lambda each: each.name)
+    if len(own_courses) == 1 and not reader.identity.operator:
+        return RedirectResponse(build_course_path(own_courses[0].id, own_courses[0].role), 303)
+    course_links = [(each.name, each.role, build_course_path(each.id, each.role)) for each in own_courses]
+    return render_page(request, reader, "home.html", courses=course_links)
 
 
 @router.get("/account")
 def show_account(request: Request, reader: SignedInReader, context: Context, made: TokenWord = "") -> Response:
     """Show the reader's name, sessions and tokens. A new token can be copied until its first use."""
     identity = reader.identity
-    listed = own_credentials.list_credentials(context.service, reader.actor)
+    lines = own_credentials.list_credentials(context.service, reader.actor)
     word = derive_secret(reader, made)
     secret = own_credentials.show_unused_token(context.service, reader.actor, word) if made else ""
     return render_page(
         request,
         reader,
         "account.html",
-        tokens=[each for each in listed if each.kind is CredentialKind.TOKEN],
-        sessions=[each for each in listed if each.kind is CredentialKind.SESSION],
+        tokens=[each for each in lines if each.kind is CredentialKind.TOKEN],
+        sessions=[each for each in lines if each.kind is CredentialKind.SESSION],
         scopes=list_offered_scopes(identity.roles.values(), operator=identity.operator, limit=identity.scopes),
         made=secret,
         word=generate_word(),
@@ -63,8 +63,8 @@ def make_token(
     scopes: Annotated[tuple[str, ...], Form()] = (),
 ) -> Response:
     """Create a token. Sending the same form twice creates only one."""
-    asked = TokenRequest(name, frozenset(scopes), days, derive_secret(reader, word))
-    own_credentials.make_token(context.service, reader.actor, asked)
+    token_request = TokenRequest(name, frozenset(scopes), days, derive_secret(reader, word))
+    own_credentials.make_token(context.service, reader.actor, token_request)
     return RedirectResponse(f"/account?made={quote(word)}", 303)
 
 

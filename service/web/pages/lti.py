@@ -73,13 +73,15 @@ def complete_launch(
     """Complete a launch: sign the user in and redirect to their course."""
     if error:
         raise UsageError(f"the platform refused the launch: {(error_description or error)[:200]}")
-    began_here = request.cookies.get(_STATE_COOKIE, "")
-    if not began_here or not hmac.compare_digest(began_here.encode(), state.encode()):
+    stored_state = request.cookies.get(_STATE_COOKIE, "")
+    if not stored_state or not hmac.compare_digest(stored_state.encode(), state.encode()):
         raise UsageError("this launch started in another browser or has expired; open the link in the course again")
-    done = launches.complete(context.service, state, id_token)
-    target = done.target if done.target != "/" else build_course_path(done.launched.course_id, done.launched.role)
+    launch = launches.complete(context.service, state, id_token)
+    target = (
+        launch.target if launch.target != "/" else build_course_path(launch.launched.course_id, launch.launched.role)
+    )
     answer = RedirectResponse(target, 303)
-    set_session_cookie(answer, context, done.session)
+    set_session_cookie(answer, context, launch.session)
     answer.delete_cookie(_STATE_COOKIE, path="/lti", secure=True, httponly=True, samesite="none")
     return answer
 
@@ -93,14 +95,18 @@ def _begin_launch(
     message_hint: str,
     client_id: str,
 ) -> Response:
-    start = context.settings.public_url or str(request.base_url).rstrip("/")
+    site_url = context.settings.public_url or str(request.base_url).rstrip("/")
     # Accept only local paths, so that the link's author cannot redirect to another site.
-    path = sanitize_target(target.removeprefix(start)) if target.startswith(f"{start}/") else "/"
+    path = sanitize_target(target.removeprefix(site_url)) if target.startswith(f"{site_url}/") else "/"
     try:
-        begun = launches.begin(context.service, LaunchRequest(issuer, client_id, login_hint, message_hint, start, path))
+        launch = launches.begin(
+            context.service, LaunchRequest(issuer, client_id, login_hint, message_hint, site_url, path)
+        )
     except UnknownPlatform:
         context.limits.unknown_platforms.spend("" if request.client is None else request.client.host)
         raise
-    answer = RedirectResponse(begun.authorization_address, 303)
-    answer.set_cookie(_STATE_COOKIE, begun.state, max_age=600, path="/lti", httponly=True, samesite="none", secure=True)
+    answer = RedirectResponse(launch.authorization_address, 303)
+    answer.set_cookie(
+        _STATE_COOKIE, launch.state, max_age=600, path="/lti", httponly=True, samesite="none", secure=True
+    )
     return answer

@@ -21,16 +21,16 @@ SeenOverrideId = Annotated[int | None, Form(ge=0, le=HIGHEST_NUMBER)]
 
 
 @router.get("")
-def show_marking(request: Request, here: CourseInstructor, context: Context, job_id: RowName) -> Response:
+def show_marking(request: Request, access: CourseInstructor, context: Context, job_id: RowName) -> Response:
     """Show the criteria of a grade with their forms, the comments and the activity log."""
-    found = grades.show_marking(context.service, here.actor, here.course_id, job_id)
+    marking = grades.show_marking(context.service, access.actor, access.course_id, job_id)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "marking.html",
-        here=here,
-        marking=found,
-        beside=grade_views.show_neighbours(context.service, here.actor, here.course_id, job_id),
+        here=access,
+        marking=marking,
+        beside=grade_views.show_neighbours(context.service, access.actor, access.course_id, job_id),
         longest_reason=LONGEST_REASON,
         longest_comment=LONGEST_COMMENT,
     )
@@ -38,7 +38,7 @@ def show_marking(request: Request, here: CourseInstructor, context: Context, job
 
 @router.post("/set")
 def set_marks(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     job_id: RowName,
     criterion: Criterion,
@@ -47,14 +47,14 @@ def set_marks(
     seen: SeenOverrideId = None,
 ) -> Response:
     """Set the marks of a criterion. Fails if another person changed them since the form was shown."""
-    asked = MarksRequest(criterion, marks, reason, seen)
-    grades.set_marks(context.service, here.actor, here.course_id, job_id, asked)
-    return _redirect_to_marking(here, job_id)
+    marks_request = MarksRequest(criterion, marks, reason, seen)
+    grades.set_marks(context.service, access.actor, access.course_id, job_id, marks_request)
+    return _redirect_to_marking(access, job_id)
 
 
 @router.post("/excuse")
 def excuse_criterion(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     job_id: RowName,
     criterion: Criterion,
@@ -62,39 +62,41 @@ def excuse_criterion(
     seen: SeenOverrideId = None,
 ) -> Response:
     """Excuse a criterion. Fails if another person changed it since the form was shown."""
-    asked = MarksRequest(criterion, None, reason, seen)
-    grades.set_marks(context.service, here.actor, here.course_id, job_id, asked)
-    return _redirect_to_marking(here, job_id)
+    marks_request = MarksRequest(criterion, None, reason, seen)
+    grades.set_marks(context.service, access.actor, access.course_id, job_id, marks_request)
+    return _redirect_to_marking(access, job_id)
 
 
 @router.post("/withdraw")
 def withdraw_override(
-    here: CourseInstructor, context: Context, job_id: RowName, criterion: Criterion, seen: SeenOverrideId = None
+    access: CourseInstructor, context: Context, job_id: RowName, criterion: Criterion, seen: SeenOverrideId = None
 ) -> Response:
     """Restore the grader's marks of a criterion. Fails if another person changed them since the form was shown."""
-    grades.withdraw_override(context.service, here.actor, here.course_id, job_id, criterion, seen)
-    return _redirect_to_marking(here, job_id)
+    grades.withdraw_override(context.service, access.actor, access.course_id, job_id, criterion, seen)
+    return _redirect_to_marking(access, job_id)
 
 
 @router.post("/comment")
 def add_comment(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     job_id: RowName,
     text: Annotated[str, Form()] = "",
     criterion: Criterion = "",
 ) -> Response:
     """Write a comment for the student."""
-    grades.add_comment(context.service, here.actor, here.course_id, job_id, CommentRequest(text, criterion))
-    return _redirect_to_marking(here, job_id)
+    grades.add_comment(context.service, access.actor, access.course_id, job_id, CommentRequest(text, criterion))
+    return _redirect_to_marking(access, job_id)
 
 
 @router.post("/uncomment")
-def withdraw_comment(here: CourseInstructor, context: Context, job_id: RowName, comment_id: SentRowNumber) -> Response:
+def withdraw_comment(
+    access: CourseInstructor, context: Context, job_id: RowName, comment_id: SentRowNumber
+) -> Response:
     """Withdraw a comment."""
-    grades.withdraw_comment(context.service, here.actor, here.course_id, job_id, comment_id)
-    return _redirect_to_marking(here, job_id)
+    grades.withdraw_comment(context.service, access.actor, access.course_id, job_id, comment_id)
+    return _redirect_to_marking(access, job_id)
 
 
-def _redirect_to_marking(here: ReaderInCourse, job_id: str) -> Response:
-    return RedirectResponse(f"/courses/{here.course_id}/grades/{job_id}/marking", 303)
+def _redirect_to_marking(access: ReaderInCourse, job_id: str) -> Response:
+    return RedirectResponse(f"/courses/{access.course_id}/grades/{job_id}/marking", 303)

@@ -75,11 +75,13 @@ def list_courses(
     added: RowNumberAfter = 0,
 ) -> Response:
     """Show the courses, a form to add an instructor, and the link of the newly added one."""
-    actor, made = reader.actor, find_created_link(request, context, reader, link)
-    listed = course_operations.list_courses(context.service, actor)
-    elsewhere = people.show(context.service, actor, added).elsewhere if added else ()
+    actor, created_link = reader.actor, find_created_link(request, context, reader, link)
+    lines = course_operations.list_courses(context.service, actor)
+    same_id_instructors = people.show(context.service, actor, added).elsewhere if added else ()
     template = "operator_courses.html"
-    return render_page(request, reader, template, courses=listed, made=made, added=added, elsewhere=elsewhere)
+    return render_page(
+        request, reader, template, courses=lines, made=created_link, added=added, elsewhere=same_id_instructors
+    )
 
 
 @router.post("/operator/courses")
@@ -92,6 +94,6 @@ def add_instructor(
 ) -> Response:
     """Add an instructor, create the course if it does not exist, and show the operator a sign-in link."""
     word = generate_word()
-    asked = MemberRequest(course, who, name, word=derive_secret(reader, word))
-    member = course_operations.add_member(context.service, reader.actor, asked).member
+    member_request = MemberRequest(course, who, name, word=derive_secret(reader, word))
+    member = course_operations.add_member(context.service, reader.actor, member_request).member
     return RedirectResponse(f"/operator/courses?link={word}&added={member.enrolment_id}", 303)

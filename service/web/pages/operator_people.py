@@ -26,8 +26,8 @@ def find_person(
     """Show a form that finds a person by course and id."""
     if not course or not who:
         return render_page(request, reader, "operator_people.html")
-    found = people.find(context.service, reader.actor, course.strip(), who.strip())
-    return RedirectResponse(f"/operator/people/{found.enrolment_id}", 303)
+    person = people.find(context.service, reader.actor, course.strip(), who.strip())
+    return RedirectResponse(f"/operator/people/{person.enrolment_id}", 303)
 
 
 @router.get("/{member_id}")
@@ -43,11 +43,11 @@ def show_person(
     """Show a person. With a course and an id, also show the person to join them with."""
     actor = reader.actor
     view = people.show(context.service, actor, member_id)
-    other = None
+    other_view = None
     if course and who:
-        found = people.find(context.service, actor, course.strip(), who.strip())
-        other = people.show(context.service, actor, found.enrolment_id)
-    return render_page(request, reader, "operator_person.html", view=view, other=other, ended=ended)
+        other_person = people.find(context.service, actor, course.strip(), who.strip())
+        other_view = people.show(context.service, actor, other_person.enrolment_id)
+    return render_page(request, reader, "operator_person.html", view=view, other=other_view, ended=ended)
 
 
 @router.post("/{member_id}/sign-out")
@@ -55,8 +55,8 @@ def sign_out(
     reader: OperatorReader, context: Context, member_id: RowNumber, release: Annotated[bool, Form()] = False
 ) -> Response:
     """End all links, sessions and tokens of a person."""
-    ended = people.sign_out(context.service, reader.actor, member_id, release=release)
-    return RedirectResponse(f"/operator/people/{member_id}?{urlencode({'ended': ended})}", 303)
+    ended_count = people.sign_out(context.service, reader.actor, member_id, release=release)
+    return RedirectResponse(f"/operator/people/{member_id}?{urlencode({'ended': ended_count})}", 303)
 
 
 @router.post("/{member_id}/join")

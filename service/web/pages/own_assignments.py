@@ -53,23 +53,23 @@ class _Rejection:
 
 
 @router.get("/courses/{course_id}/mine")
-def list_own_assignments(request: Request, here: CourseStudent, context: Context) -> Response:
+def list_own_assignments(request: Request, access: CourseStudent, context: Context) -> Response:
     """Show the open assignments and the student's submissions."""
-    lines = own_views.list_assignments(context.service, here.actor, here.course_id)
-    return render_page(request, here.reader, "mine.html", here=here, lines=lines)
+    lines = own_views.list_assignments(context.service, access.actor, access.course_id)
+    return render_page(request, access.reader, "mine.html", here=access, lines=lines)
 
 
 @router.get("/courses/{course_id}/mine/{assignment}")
-def show_own_assignment(request: Request, here: CourseStudent, context: Context, assignment: str) -> Response:
+def show_own_assignment(request: Request, access: CourseStudent, context: Context, assignment: str) -> Response:
     """Show an assignment's task, the form to submit to it, and earlier attempts."""
-    return _render_assignment(request, here, context, assignment, None)
+    return _render_assignment(request, access, context, assignment, None)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}")
 @takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def submit_own_files(
     request: Request,
-    here: CourseStudent,
+    access: CourseStudent,
     context: Context,
     assignment: str,
     files: Files = (),
@@ -77,30 +77,30 @@ def submit_own_files(
     even_in_part: Annotated[bool, Form()] = False,
 ) -> Response:
     """Submit the chosen files and typed texts, and redirect to the submission's page."""
-    sheet = own_views.show_sheet(context.service, here.actor, here.course_id, assignment)
+    sheet = own_views.show_sheet(context.service, access.actor, access.course_id, assignment)
     try:
-        asked = SubmissionRequest(assignment, collect_sent_files(sheet, files, texts), even_in_part)
-        accepted = submit(context, here.actor, here.course_id, asked)
+        submission_request = SubmissionRequest(assignment, collect_sent_files(sheet, files, texts), even_in_part)
+        accepted_submission = submit(context, access.actor, access.course_id, submission_request)
     except NotFound:
         raise
     except UsageError as error:
         sentence = describe_error(error, detect_language(request))
-        refused = _Rejection(sentence, 422, texts, lacks_part=isinstance(error, MissingPart))
-        return _render_assignment(request, here, context, assignment, refused)
+        rejection = _Rejection(sentence, 422, texts, lacks_part=isinstance(error, MissingPart))
+        return _render_assignment(request, access, context, assignment, rejection)
     except HTTPException as error:
         if error.status_code != 429:
             raise
         sentence = detect_language(request).translate_sentence(extract_message(error))
-        refused = _Rejection(sentence, 429, texts, dict(error.headers or {}))
-        return _render_assignment(request, here, context, assignment, refused)
-    return RedirectResponse(f"/courses/{here.course_id}/mine/submissions/{accepted.submission_id}", 303)
+        rejection = _Rejection(sentence, 429, texts, dict(error.headers or {}))
+        return _render_assignment(request, access, context, assignment, rejection)
+    return RedirectResponse(f"/courses/{access.course_id}/mine/submissions/{accepted_submission.submission_id}", 303)
 
 
 @router.get("/courses/{course_id}/mine/{assignment}/given/{file}")
-def download_given_file(here: CourseStudent, context: Context, assignment: str, file: str) -> Response:
+def download_given_file(access: CourseStudent, context: Context, assignment: str, file: str) -> Response:
     """Return a file that the assignment provides to students."""
     return respond_with_attachment(
-        own_views.show_given_file(context.service, here.actor, here.course_id, assignment, file), file
+        own_views.show_given_file(context.service, access.actor, access.course_id, assignment, file), file
     )
 
 
@@ -110,17 +110,17 @@ def collect_sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Seq
     Raises:
         UsageError: A file was both chosen and typed.
     """
-    chosen = [UploadedFile(each.filename, each.file) for each in files if each.filename]
-    typed = [
+    chosen_files = [UploadedFile(each.filename, each.file) for each in files if each.filename]
+    typed_files = [
         UploadedFile(name, BytesIO(text.replace("\r\n", "\n").encode()))
         for name, text in zip(sheet.asked, texts, strict=False)
         if text.strip()
     ]
-    names = {each.flat_name.lower() for each in chosen}
-    for each in typed:
-        if each.flat_name in names:
-            raise UsageError("%(name)s was both selected as a file and typed. Remove one of them.", name=each.flat_name)
-    return [*chosen, *typed]
+    names = {each.flat_name.lower() for each in chosen_files}
+    for file in typed_files:
+        if file.flat_name in names:
+            raise UsageError("%(name)s was both selected as a file and typed. Remove one of them.", name=file.flat_name)
+    return [*chosen_files, *typed_files]
 
 
 def compute_marks_curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, float]]:
@@ -133,25 +133,25 @@ def compute_marks_curve(attempts: Sequence[OwnSubmission]) -> list[tuple[float, 
 
 
 def _render_assignment(
-    request: Request, here: ReaderInCourse, context: WebContext, assignment: str, refused: _Rejection | None
+    request: Request, access: ReaderInCourse, context: WebContext, assignment: str, rejection: _Rejection | None
 ) -> Response:
-    found = own_views.show_task(context.service, here.actor, here.course_id, assignment)
-    shown = render_page(
+    task = own_views.show_task(context.service, access.actor, access.course_id, assignment)
+    page = render_page(
         request,
-        here.reader,
+        access.reader,
         "own_assignment.html",
-        status_code=refused.status if refused else 200,
-        here=here,
-        sheet=found.sheet,
-        description=join_wrapped_lines(found.sheet.description),
-        attempts=found.attempts,
-        counting=found.counting,
-        curve=compute_marks_curve(found.attempts),
-        allowance=found.allowance,
-        is_open=found.is_open,
-        can_try=found.can_test_run,
-        has_tried=found.has_test_run,
-        refused=refused,
+        status_code=rejection.status if rejection else 200,
+        here=access,
+        sheet=task.sheet,
+        description=join_wrapped_lines(task.sheet.description),
+        attempts=task.attempts,
+        counting=task.counting,
+        curve=compute_marks_curve(task.attempts),
+        allowance=task.allowance,
+        is_open=task.is_open,
+        can_try=task.can_test_run,
+        has_tried=task.has_test_run,
+        refused=rejection,
     )
-    shown.headers.update(refused.headers if refused else {})
-    return shown
+    page.headers.update(rejection.headers if rejection else {})
+    return page

@@ -20,39 +20,46 @@ router = APIRouter()
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}")
-def show_own_submission(request: Request, here: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
+def show_own_submission(
+    request: Request, access: CourseStudent, context: Context, submission_id: RowNumber
+) -> Response:
     """Show the progress or the report of a submission.
 
     Requests from htmx get only the progress, or an instruction to reload the page when grading has ended.
     """
-    asked = (context.service, here.actor, here.course_id, submission_id)
+    submission_key = (context.service, access.actor, access.course_id, submission_id)
     if is_htmx_request(request):
-        part = own_views.show_submission(*asked)
-        if part.place is None:
+        progress_view = own_views.show_submission(*submission_key)
+        if progress_view.place is None:
             return Response(headers={"hx-refresh": "true"})
         return render_page(
-            request, here.reader, "own_progress.html", here=here, found=part.submission, place=part.place
+            request,
+            access.reader,
+            "own_progress.html",
+            here=access,
+            found=progress_view.submission,
+            place=progress_view.place,
         )
-    found = own_views.show_submission_report(*asked, detect_language(request))
+    view = own_views.show_submission_report(*submission_key, detect_language(request))
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "own_submission.html",
-        here=here,
-        found=found.submission,
-        place=found.place,
-        attempts=found.attempts,
-        counting=found.counting,
-        is_open=found.is_open,
-        curve=compute_marks_curve(found.attempts),
-        allowance=found.allowance,
-        appeals=found.appeals,
-        report=found.report,
+        here=access,
+        found=view.submission,
+        place=view.place,
+        attempts=view.attempts,
+        counting=view.counting,
+        is_open=view.is_open,
+        curve=compute_marks_curve(view.attempts),
+        allowance=view.allowance,
+        appeals=view.appeals,
+        report=view.report,
     )
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/files")
-def download_own_files(here: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
+def download_own_files(access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files as a zip that can be submitted again."""
-    found = own_views.show_files(context.service, here.actor, here.course_id, submission_id)
-    return respond_with_attachment(found.data, found.name, "application/zip")
+    archive = own_views.show_files(context.service, access.actor, access.course_id, submission_id)
+    return respond_with_attachment(archive.data, archive.name, "application/zip")

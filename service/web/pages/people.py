@@ -40,7 +40,7 @@ _LONGEST = 200
 @router.get("")
 def list_people(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     q: Annotated[str, Query(max_length=100)] = "",
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
@@ -48,13 +48,13 @@ def list_people(
     removed: Annotated[str, Query(max_length=_LONGEST)] = "",
 ) -> Response:
     """Show everybody in the course, and forms to enrol students."""
-    return _render_list(request, here, context, text=q, number=number, enrolled=enrolled, removed=removed)
+    return _render_list(request, access, context, text=q, number=number, enrolled=enrolled, removed=removed)
 
 
 @router.post("")
 def enrol_student(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     who: Annotated[str, Form(min_length=1, max_length=_LONGEST)],
     name: Annotated[str, Form(max_length=_LONGEST)] = "",
@@ -62,16 +62,16 @@ def enrol_student(
 ) -> Response:
     """Enrol one student. An existing student stays unchanged."""
     try:
-        enrolment_id = people.enrol_new(context.service, here.actor, here.course_id, Student(who, name, email))
+        enrolment_id = people.enrol_new(context.service, access.actor, access.course_id, Student(who, name, email))
     except Conflict as error:
-        return _render_list(request, here, context, refused=error, status_code=422)
-    return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
+        return _render_list(request, access, context, rejection=error, status_code=422)
+    return RedirectResponse(f"/courses/{access.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/table")
 @takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
 def enrol_table(
-    request: Request, here: CourseInstructor, context: Context, file: Annotated[UploadFile, File()]
+    request: Request, access: CourseInstructor, context: Context, file: Annotated[UploadFile, File()]
 ) -> Response:
     """Enrol all students of an uploaded table."""
     with tempfile.TemporaryDirectory(prefix="robomark-people-") as folder:
@@ -79,87 +79,96 @@ def enrol_table(
         with path.open("xb") as sink:
             shutil.copyfileobj(file.file, sink)
         try:
-            listed = list_known_students(read_people(path))
+            students = list_known_students(read_people(path))
         except UsageError as error:
-            return _render_list(request, here, context, refused=error, status_code=422)
-    enrolled = people.enrol(context.service, here.actor, here.course_id, listed)
-    return RedirectResponse(f"/courses/{here.course_id}/people?enrolled={len(set(enrolled))}", 303)
+            return _render_list(request, access, context, rejection=error, status_code=422)
+    enrolment_ids = people.enrol(context.service, access.actor, access.course_id, students)
+    return RedirectResponse(f"/courses/{access.course_id}/people?enrolled={len(set(enrolment_ids))}", 303)
 
 
 @router.get("/table")
-def redirect_to_list(here: CourseInstructor) -> Response:
+def redirect_to_list(access: CourseInstructor) -> Response:
     """Redirect to the list, for readers who open the upload address in the browser."""
-    return RedirectResponse(f"/courses/{here.course_id}/people", 303)
+    return RedirectResponse(f"/courses/{access.course_id}/people", 303)
 
 
 @router.post("/links")
 def create_links(
     request: Request,
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     days: Annotated[int, Form(ge=1, le=sign_in_links.MOST_DAYS)] = sign_in_links.DAYS,
 ) -> Response:
     """Return a table with a new sign-in link for each student, to be sent to them."""
-    made = sign_in_links.make_links(context.service, here.actor, here.course_id, days)
+    student_links = sign_in_links.make_links(context.service, access.actor, access.course_id, days)
     rows = [["id", "name", "email", "link", "expires", "reason"]]
-    for each in made:
-        link = build_sign_in_url(request, context, each.secret) if each.secret else ""
-        until = each.expires_at.astimezone().isoformat(timespec="minutes") if each.expires_at else ""
-        rows.append([each.student.id, each.student.name, each.student.email, link, until, each.reason])
+    for student_link in student_links:
+        link = build_sign_in_url(request, context, student_link.secret) if student_link.secret else ""
+        expiry = student_link.expires_at.astimezone().isoformat(timespec="minutes") if student_link.expires_at else ""
+        rows.append(
+            [
+                student_link.student.id,
+                student_link.student.name,
+                student_link.student.email,
+                link,
+                expiry,
+                student_link.reason,
+            ]
+        )
     return respond_with_attachment(
-        render_safe_csv(rows).encode("utf-8-sig"), f"links {here.course}.csv", "text/csv; charset=utf-8"
+        render_safe_csv(rows).encode("utf-8-sig"), f"links {access.course}.csv", "text/csv; charset=utf-8"
     )
 
 
 @router.get("/{enrolment_id}")
 def show_student(
-    request: Request, here: CourseInstructor, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
+    request: Request, access: CourseInstructor, context: Context, enrolment_id: RowNumber, link: LinkWord = ""
 ) -> Response:
     """Show a student's submissions and extensions, and a newly created sign-in link."""
-    view = people_views.show_student(context.service, here.actor, here.course_id, enrolment_id)
-    made = find_created_link(request, context, here.reader, link)
+    view = people_views.show_student(context.service, access.actor, access.course_id, enrolment_id)
+    created_link = find_created_link(request, context, access.reader, link)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "person.html",
-        here=here,
+        here=access,
         member=view.member,
         prepared=view.assignments,
         titles={each.assignment: each.title for each in view.assignments},
         submitted=view.gradings,
         some_hidden=view.some_hidden,
         extensions=view.extensions,
-        made=made if made and made.person_id == view.member.person_id else None,
+        made=created_link if created_link and created_link.person_id == view.member.person_id else None,
         gone=bool(link),
         has_submitted=view.has_submitted,
     )
 
 
 @router.get("/{enrolment_id}/link")
-def redirect_to_student(here: CourseInstructor, enrolment_id: RowNumber) -> Response:
+def redirect_to_student(access: CourseInstructor, enrolment_id: RowNumber) -> Response:
     """Redirect to the student's page, for readers who open the address that creates links."""
-    return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
+    return RedirectResponse(f"/courses/{access.course_id}/people/{enrolment_id}", 303)
 
 
 @router.post("/{enrolment_id}/link")
-def create_link(here: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
+def create_link(access: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
     """Create a sign-in link for a student. The student's page shows it to its creator."""
-    word, actor = generate_word(), here.actor
-    made_of = derive_secret(here.reader, word)
-    sign_in_links.make_students_link(context.service, actor, here.course_id, enrolment_id, word=made_of)
-    return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}?link={word}", 303)
+    word, actor = generate_word(), access.actor
+    link_seed = derive_secret(access.reader, word)
+    sign_in_links.make_students_link(context.service, actor, access.course_id, enrolment_id, word=link_seed)
+    return RedirectResponse(f"/courses/{access.course_id}/people/{enrolment_id}?link={word}", 303)
 
 
 @router.post("/{enrolment_id}/remove")
-def remove(here: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
+def remove(access: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
     """Remove a student who has submitted nothing from the course."""
-    who = people.remove(context.service, here.actor, here.course_id, enrolment_id)
-    return RedirectResponse(f"/courses/{here.course_id}/people?{urlencode({'removed': who[:_LONGEST]})}", 303)
+    student_id = people.remove(context.service, access.actor, access.course_id, enrolment_id)
+    return RedirectResponse(f"/courses/{access.course_id}/people?{urlencode({'removed': student_id[:_LONGEST]})}", 303)
 
 
 @router.post("/{enrolment_id}/extensions")
 def extend(
-    here: CourseInstructor,
+    access: CourseInstructor,
     context: Context,
     enrolment_id: RowNumber,
     assignment: Annotated[str, Form(max_length=100)] = "",
@@ -167,33 +176,33 @@ def extend(
     more_attempts: Annotated[int, Form(ge=0, le=1000)] = 0,
 ) -> Response:
     """Give a student more time or attempts. This replaces an earlier extension for the same assignment."""
-    asked = ExtensionRequest(assignment, parse_date_time(due), more_attempts)
-    policies.extend(context.service, here.actor, here.course_id, enrolment_id, asked)
-    return RedirectResponse(f"/courses/{here.course_id}/people/{enrolment_id}", 303)
+    extension_request = ExtensionRequest(assignment, parse_date_time(due), more_attempts)
+    policies.extend(context.service, access.actor, access.course_id, enrolment_id, extension_request)
+    return RedirectResponse(f"/courses/{access.course_id}/people/{enrolment_id}", 303)
 
 
 def _render_list(
     request: Request,
-    here: ReaderInCourse,
+    access: ReaderInCourse,
     context: WebContext,
     *,
     text: str = "",
     number: int = 1,
     enrolled: int = 0,
     removed: str = "",
-    refused: UsageError | None = None,
+    rejection: UsageError | None = None,
     status_code: int = 200,
 ) -> Response:
-    view = people_views.search_members(context.service, here.actor, here.course_id, text, number)
+    view = people_views.search_members(context.service, access.actor, access.course_id, text, number)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "people.html",
         status_code=status_code,
-        here=here,
+        here=access,
         view=view,
         text=text,
-        refused="" if refused is None else detect_language(request).translate_sentence(refused.message),
+        refused="" if rejection is None else detect_language(request).translate_sentence(rejection.message),
         enrolled=enrolled,
         removed=removed,
         days=sign_in_links.DAYS,

@@ -21,9 +21,9 @@ RegisteredText = Annotated[str, Form(min_length=1, max_length=operations.LONGEST
 @router.get("/operator/platforms")
 def list_platforms(request: Request, reader: OperatorReader, context: Context) -> Response:
     """Show the registered platforms, the values for a platform's administrator, and a form to register one."""
-    registered = operations.list_platforms(context.service, reader.actor)
+    lines = operations.list_platforms(context.service, reader.actor)
     start = context.settings.public_url or str(request.base_url).rstrip("/")
-    return render_page(request, reader, "platforms.html", platforms=registered, start=start)
+    return render_page(request, reader, "platforms.html", platforms=lines, start=start)
 
 
 @router.post("/operator/platforms")
@@ -40,51 +40,51 @@ def register(
     service_origins: Annotated[str, Form(max_length=1000)] = "",
 ) -> Response:
     """Register a platform, or change the one with the same issuer and client id."""
-    listed, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
+    deployment_ids, origins = (each.replace(",", " ").split() for each in (deployments, service_origins))
     addresses = (authorization_url, token_url, keys_url)
-    asked = Registration(name, issuer, client_id, tuple(listed), *addresses, tuple(origins))
-    operations.register(context.service, reader.actor, asked)
+    registration = Registration(name, issuer, client_id, tuple(deployment_ids), *addresses, tuple(origins))
+    operations.register(context.service, reader.actor, registration)
     return RedirectResponse("/operator/platforms", 303)
 
 
 @router.get("/courses/{course_id}/platform")
-def show_course_platform(request: Request, here: CourseInstructor, context: Context) -> Response:
+def show_course_platform(request: Request, access: CourseInstructor, context: Context) -> Response:
     """Show the course's platform, with buttons to fetch members and send marks."""
-    return _render_course_platform(request, here, context)
+    return _render_course_platform(request, access, context)
 
 
 @router.post("/courses/{course_id}/platform/members")
-def fetch_members(request: Request, here: CourseInstructor, context: Context) -> Response:
+def fetch_members(request: Request, access: CourseInstructor, context: Context) -> Response:
     """Enrol all members of the course on the platform."""
-    enrolled = operations.enrol_members(context.service, here.actor, here.course_id)
-    return _render_course_platform(request, here, context, enrolled=enrolled)
+    enrolled_members = operations.enrol_members(context.service, access.actor, access.course_id)
+    return _render_course_platform(request, access, context, enrolled_members=enrolled_members)
 
 
 @router.post("/courses/{course_id}/platform/marks")
 def pass_back(
-    request: Request, here: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=200)]
+    request: Request, access: CourseInstructor, context: Context, assignment: Annotated[str, Form(max_length=200)]
 ) -> Response:
     """Send the published marks of an assignment to the platform's gradebook."""
-    sent = operations.pass_back(context.service, here.actor, here.course_id, assignment)
-    return _render_course_platform(request, here, context, sent=sent)
+    sent_count = operations.pass_back(context.service, access.actor, access.course_id, assignment)
+    return _render_course_platform(request, access, context, sent_count=sent_count)
 
 
 def _render_course_platform(
     request: Request,
-    here: ReaderInCourse,
+    access: ReaderInCourse,
     context: WebContext,
     *,
-    enrolled: EnrolledMembers | None = None,
-    sent: int | None = None,
+    enrolled_members: EnrolledMembers | None = None,
+    sent_count: int | None = None,
 ) -> Response:
-    view = operations.show_course_platform(context.service, here.actor, here.course_id)
+    view = operations.show_course_platform(context.service, access.actor, access.course_id)
     return render_page(
         request,
-        here.reader,
+        access.reader,
         "course_platform.html",
-        here=here,
+        here=access,
         link=view.link,
         assignments=view.assignments,
-        enrolled=enrolled,
-        sent=sent,
+        enrolled=enrolled_members,
+        sent=sent_count,
     )

@@ -40,8 +40,8 @@ def show_link(request: Request, reader: OptionalReader, context: Context, link: 
     if owner is None:
         # Count only failures: a valid link always works, even after many failures from the same address.
         context.limits.failed_sign_ins.spend(_find_client_address(request))
-        refused = _INVALID_LINK if reader is None else _INVALID_LINK_SIGNED_IN
-        return render_page(request, reader, "sign_in.html", status_code=410, target="/", refused=refused)
+        message = _INVALID_LINK if reader is None else _INVALID_LINK_SIGNED_IN
+        return render_page(request, reader, "sign_in.html", status_code=410, target="/", refused=message)
     return render_page(request, reader, "sign_in_link.html", link=link, name=owner.name)
 
 
@@ -56,14 +56,14 @@ def sign_in(
     """Exchange a link's secret or a token for a session of this browser."""
     # Users may paste the whole link.
     secret = secret.strip().rstrip("/").rpartition("/")[2]
-    started = operations.sign_in(context.service, None if reader is None else reader.actor, secret)
-    if started is None:
+    new_session = operations.sign_in(context.service, None if reader is None else reader.actor, secret)
+    if new_session is None:
         context.limits.failed_sign_ins.spend(_find_client_address(request))
         return render_page(
             request, reader, "sign_in.html", status_code=403, target=sanitize_target(target), refused=_INVALID_LINK
         )
     answer = RedirectResponse(sanitize_target(target), 303)
-    set_session_cookie(answer, context, started)
+    set_session_cookie(answer, context, new_session)
     return answer
 
 
@@ -90,11 +90,11 @@ def choose_language(
     return answer
 
 
-def set_session_cookie(answer: Response, context: WebContext, started: NewSession) -> None:
+def set_session_cookie(answer: Response, context: WebContext, new_session: NewSession) -> None:
     """Set the session cookie of the response, for the lifetime of the session."""
-    seconds, secure = int(started.lifetime.total_seconds()), _is_secure(context)
+    seconds, is_secure = int(new_session.lifetime.total_seconds()), _is_secure(context)
     answer.set_cookie(
-        SESSION_COOKIE, started.secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=secure
+        SESSION_COOKIE, new_session.secret, max_age=seconds, path="/", httponly=True, samesite="lax", secure=is_secure
     )
 
 

@@ -30,78 +30,78 @@ router = APIRouter()
 
 
 @router.get("/courses/{course_id}/mine/{assignment}/try")
-def show_newest_test_run(request: Request, here: CourseStudent, context: Context, assignment: str) -> Response:
+def show_newest_test_run(request: Request, access: CourseStudent, context: Context, assignment: str) -> Response:
     """Show the newest test run, with its program in the form for the next one.
 
     Requests from htmx get only the progress, or an instruction to reload the page when the run has ended.
     """
     if not is_htmx_request(request):
-        return _render_test_run(request, here, context, assignment)
-    line = test_runs.find_newest(context.service, here.actor, here.course_id, assignment)
+        return _render_test_run(request, access, context, assignment)
+    line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
     if line is None or not line.waits:
         return Response(headers={"hx-refresh": "true"})
-    return render_page(request, here.reader, "tryout_progress.html", here=here, line=line)
+    return render_page(request, access.reader, "tryout_progress.html", here=access, line=line)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
 @takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
 def submit_test_run(
-    request: Request, here: CourseStudent, context: Context, assignment: str, files: Files = (), texts: Texts = ()
+    request: Request, access: CourseStudent, context: Context, assignment: str, files: Files = (), texts: Texts = ()
 ) -> Response:
     """Start a test run of the chosen files and typed texts."""
-    sheet = own_views.show_sheet(context.service, here.actor, here.course_id, assignment)
+    sheet = own_views.show_sheet(context.service, access.actor, access.course_id, assignment)
     try:
-        start_test_run(context, here.actor, here.course_id, assignment, collect_sent_files(sheet, files, texts))
+        start_test_run(context, access.actor, access.course_id, assignment, collect_sent_files(sheet, files, texts))
     except NotFound:
         raise
     except UsageError as error:
         return _render_test_run(
-            request, here, context, assignment, 422, describe_error(error, detect_language(request)), texts
+            request, access, context, assignment, 422, describe_error(error, detect_language(request)), texts
         )
     except HTTPException as error:
         if error.status_code != 429:
             raise
         sentence = detect_language(request).translate_sentence(extract_message(error))
-        return _render_test_run(request, here, context, assignment, 429, sentence, texts, error.headers)
+        return _render_test_run(request, access, context, assignment, 429, sentence, texts, error.headers)
     return RedirectResponse(str(request.url.path), 303)
 
 
 def _render_test_run(
     request: Request,
-    here: ReaderInCourse,
+    access: ReaderInCourse,
     context: WebContext,
     assignment: str,
     status: int = 200,
-    refused: str = "",
-    typed: Sequence[str] = (),
+    message: str = "",
+    typed_texts: Sequence[str] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    found = test_runs.show_newest(context.service, here.actor, here.course_id, assignment)
-    shown = render_page(
+    view = test_runs.show_newest(context.service, access.actor, access.course_id, assignment)
+    page = render_page(
         request,
-        here.reader,
+        access.reader,
         "tryout.html",
         status_code=status,
-        here=here,
-        sheet=found.sheet,
-        seconds=found.seconds,
-        line=found.line,
-        replay=render_replay_section(found.replay, detect_language(request)) if found.replay else None,
-        refused=refused,
-        texts=list(typed) or (_read_texts(found.sheet, found.submission) if found.submission else []),
+        here=access,
+        sheet=view.sheet,
+        seconds=view.seconds,
+        line=view.line,
+        replay=render_replay_section(view.replay, detect_language(request)) if view.replay else None,
+        refused=message,
+        texts=list(typed_texts) or (_read_texts(view.sheet, view.submission) if view.submission else []),
     )
-    shown.headers.update(headers or {})
-    return shown
+    page.headers.update(headers or {})
+    return page
 
 
-def _read_texts(sheet: TaskSheet, tried: Submission) -> list[str]:
+def _read_texts(sheet: TaskSheet, submission: Submission) -> list[str]:
     """Return the texts of the test run's files, in the order of the requested files.
 
     A missing file gives an empty text.
     """
-    parts = {PART_FILES["program"]: tried.program, PART_FILES["responder"]: tried.responder}
-    found = []
+    parts = {PART_FILES["program"]: submission.program, PART_FILES["responder"]: submission.responder}
+    texts = []
     for name in sheet.asked:
         code = parts.get(name)
-        found.append(code.text if code is not None else tried.files.get(name, b"").decode("utf-8", "replace"))
-    return found
+        texts.append(code.text if code is not None else submission.files.get(name, b"").decode("utf-8", "replace"))
+    return texts

@@ -204,10 +204,10 @@ class Motor:
 
     def wait(self, cond: Callable[[str], bool], timeout: float | None = None) -> bool:
         """Poll every 10 ms until ``cond(state)`` is true. Return False after ``timeout`` milliseconds."""
-        began = link.units
+        start = link.units
         while not cond(self.state):
             link.wait(_POLL)
-            if timeout is not None and link.units - began > timeout * 3000:
+            if timeout is not None and link.units - start > timeout * 3000:
                 return False
         return True
 

@@ -63,10 +63,10 @@ class _SpeedRate(SpeedValue):
     _most = ""
 
     def to_native_units(self, motor: Any) -> float:
-        most = getattr(motor, self._most)
-        if abs(self.value) > most:
-            raise ValueError(f"invalid {type(self).__name__}: {self.value}, the most is {most}")
-        return float(self.value / most * motor.max_speed)
+        maximum = getattr(motor, self._most)
+        if abs(self.value) > maximum:
+            raise ValueError(f"invalid {type(self).__name__}: {self.value}, the most is {maximum}")
+        return float(self.value / maximum * motor.max_speed)
 
 
 class SpeedRPS(_SpeedRate):

@@ -70,7 +70,7 @@ def graded(case: dict[str, Any], folder: Path, runner: TrialRunner) -> Grade:
     (folder / ("robot.py" if part == "program" else "responder.py")).write_text(case["text"].lstrip("\n"), "utf-8")
     for name, data in files_of(case).items():
         (folder / name).write_bytes(data)
-    return grade(read_submission(folder, asked=asked.parts), asked, runner=runner)
+    return grade(read_submission(folder, required_parts=asked.parts), asked, runner=runner)
 
 
 # Cases that remove the same modules are adjacent, so that they share a zygote.
@@ -104,7 +104,7 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, run
     (tmp_path / "responder.py").write_text(NETWORK)
     scenario = Scenario("s", (Pose(200, 800, 0),), seconds=5.0)
     asked = Assignment("a", "A", WorldSpec(), Parts(), (scenario,), (WITHOUT,))
-    recording = grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).trials[0].recording
+    recording = grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).trials[0].recording
     assert recording.verdict is Verdict.RESPONDER_ERROR
     assert recording.faults[0].message == "ModuleNotFoundError: joblib is not allowed in this assignment"
     assert recording.faults[0].line == 1
@@ -116,7 +116,7 @@ def test_only_what_carries_marks_is_refused(rules: dict[str, Any], tmp_path: Pat
     text = "import joblib\ndef f(): return True\n"
     (tmp_path / "responder.py").write_text(text)
     asked = assignment("responder", {"uses": ["import joblib"], **rules})
-    assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == 1
+    assert grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks == 1
 
 
 COMPILED = """
@@ -136,14 +136,14 @@ def test_what_was_compiled_of_a_closed_file_is_closed_too(
     compiled.parent.chmod(0o755)
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
     asked = assignment("responder", {"avoids": [f"import {module}"]})
-    assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks
+    assert grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks == marks
 
 
 def test_a_robot_program_does_without_what_its_preamble_needs(tmp_path: Path, runner: TrialRunner) -> None:
     text = "say('x')\nfrom ev3dev2.sound import Sound\nsay('y')"
     (tmp_path / "robot.py").write_text(text)
     asked = assignment("program", {"avoids": ["import ev3dev2.sound", "import time"]})
-    trial = grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).trials[0]
+    trial = grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).trials[0]
     assert [line.text for line in trial.recording.spoken] == ["x"]
     assert trial.recording.faults[0].message == "ModuleNotFoundError: ev3dev2.sound is not allowed in this assignment"
 
@@ -152,7 +152,10 @@ def test_one_job_after_the_other_has_its_own_modules(tmp_path: Path, runner: Tri
     (tmp_path / "responder.py").write_text("def f():\n    import sklearn\n    return True\n")
     for rules, marks in (({"avoids": ["import sklearn"]}, 0), ({"uses": ["import sklearn"]}, 1)) * 2:
         asked = assignment("responder", rules)
-        assert grade(read_submission(tmp_path, asked=asked.parts), asked, runner=runner).criteria[1].marks == marks
+        assert (
+            grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks
+            == marks
+        )
 
 
 def test_what_staff_are_told_no_student_reads(tmp_path: Path, runner: TrialRunner) -> None:

@@ -33,7 +33,7 @@ from submissions.criteria import SCHEMAS
 from submissions.submission import Submission
 
 ASSIGNMENT = find_assignment("parser-agent-and-logger")
-REFERENCE = read_submission(locate_examples(ASSIGNMENT.id) / "reference", asked=ASSIGNMENT.parts)
+REFERENCE = read_submission(locate_examples(ASSIGNMENT.id) / "reference", required_parts=ASSIGNMENT.parts)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,9 @@ def as_notebook(folder: Path, *first: str, leave_out: str = "") -> Submission:
     responder = sources.pop("responder.py")
     sources.pop(leave_out, None)
     agents = [f"%%writefile {name}\n{text}" for name, text in sources.items()]
-    return read_submission(notebook(folder / "ada.ipynb", [*first, *agents, responder]), asked=ASSIGNMENT.parts)
+    return read_submission(
+        notebook(folder / "ada.ipynb", [*first, *agents, responder]), required_parts=ASSIGNMENT.parts
+    )
 
 
 def test_a_notebook_brings_agents_in_cells_and_gets_the_marks_of_the_files(

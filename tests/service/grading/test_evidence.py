@@ -184,7 +184,7 @@ def test_what_was_seen_from_many_sides_is_one_thing(
     asked = find_assignment(name)
     only = next(each for each in asked.criteria if each.id == marked)
     asked = replace(asked, criteria=(only,))
-    submission = read_submission(DATA / "evidence" / folder, asked=asked.parts)
+    submission = read_submission(DATA / "evidence" / folder, required_parts=asked.parts)
     if answers == "the network":
         responder = (locate_examples(name) / "reference" / "responder.py").read_text()
         submission = replace(submission, responder=SourceFile("responder.py", responder))

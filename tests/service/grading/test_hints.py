@@ -91,7 +91,7 @@ def written(case: Mapping[str, Any], folder: Path) -> Path:
 
 def graded_case(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> Grade:
     asked = asked_in(case["assignment"], folder)
-    return grade(read_submission(written(case, folder), asked=asked.parts), asked, runner=runner)
+    return grade(read_submission(written(case, folder), required_parts=asked.parts), asked, runner=runner)
 
 
 @pytest.mark.parametrize("case", NEAR_MISSES, ids=lambda case: case["name"])
@@ -137,7 +137,7 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
 def test_a_hint_tells_nothing_of_hidden_trials_and_criteria(runner: TrialRunner, tmp_path: Path) -> None:
     case = one_like("py in small letters")
     asked = asked_in(case["assignment"], tmp_path)
-    submission = read_submission(written(case, tmp_path), asked=asked.parts)
+    submission = read_submission(written(case, tmp_path), required_parts=asked.parts)
     hidden_trials = replace(asked, scenarios=tuple(replace(each, visibility="hidden") for each in asked.scenarios))
     assert grade(submission, hidden_trials, runner=runner).hints == ()
     criteria = tuple(each.model_copy(update={"visibility": "hidden"}) for each in asked.criteria)
@@ -174,7 +174,7 @@ CELLS = {
 def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_path: Path) -> None:
     cells, hint = CELLS[name]
     asked = find_assignment("echo-responder")
-    submission = read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=asked.parts)
+    submission = read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=asked.parts)
     assert grade(submission, asked, runner=runner).hints[0].startswith(hint)
 
 
@@ -192,7 +192,7 @@ def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_pat
 def test_a_notebook_without_a_robot_program_is_told_what_was_nearly_one(cell: str, found: str, tmp_path: Path) -> None:
     asked = find_assignment("echo-responder")
     with pytest.raises(UsageError) as refusal:
-        read_submission(notebook(tmp_path / "ada.ipynb", [cell]), asked=asked.parts)
+        read_submission(notebook(tmp_path / "ada.ipynb", [cell]), required_parts=asked.parts)
     assert str(refusal.value).endswith(found)
 
 
@@ -200,7 +200,7 @@ def test_files_with_other_names_are_to_be_renamed(tmp_path: Path) -> None:
     for name in ("my_robot.py", "responders.py", "helper.py"):
         (tmp_path / name).write_text("x = 1\n")
     with pytest.raises(UsageError, match=r"; rename my_robot[.]py to robot[.]py and responders[.]py to responder[.]py"):
-        read_submission(tmp_path, asked=find_assignment("echo-responder").parts)
+        read_submission(tmp_path, required_parts=find_assignment("echo-responder").parts)
 
 
 def test_what_the_preloaded_magic_brings_is_known() -> None:
@@ -226,7 +226,7 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
         (tmp_path / "robot.py").write_text(text)
         (tmp_path / "responder.py").write_text("def responder(text):\n" + "    print(text)\n" * lines)
         asked = find_assignment("echo-responder")
-        submission = read_submission(tmp_path, asked=asked.parts)
+        submission = read_submission(tmp_path, required_parts=asked.parts)
         clues = collect_clues(submission, plan_run(submission, asked), (), ())
         said = tuple(TimedText(0.0, f"P Y : :{number}") for number in range(lines))
         recording = replace(line_follower_recording(1), printed=said, spoken=said)
@@ -243,7 +243,7 @@ def test_a_rule_that_fails_is_logged_and_the_others_give_their_hints(
     runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     asked = find_assignment("echo-responder")
-    submission = read_submission(locate_examples("echo-responder") / "flawed", asked=asked.parts)
+    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=asked.parts)
     whole = grade(submission, asked, runner=runner)
     assert whole.hints
     for rules in ("_FILE_RULES", "_ERROR_RULES", "_RESULT_RULES", "_FALLBACK_RULES"):
@@ -287,7 +287,7 @@ def test_a_criterion_that_only_hidden_trials_fail_leaves_all_rules_working(
     (tmp_path / "assignment.toml").write_text(HIDDEN_TURN)
     (tmp_path / "robot.py").write_text("tank_drive.on_for_seconds(SpeedPercent(30), SpeedPercent(30), 2.44)\n")
     asked = find_assignment(str(tmp_path))
-    graded = grade(read_submission(tmp_path / "robot.py", asked=asked.parts), asked, runner=runner)
+    graded = grade(read_submission(tmp_path / "robot.py", required_parts=asked.parts), asked, runner=runner)
     assert 0 < graded.marks < graded.max_marks
     assert [bool(each.recording.places) for each in graded.trials] == [True, False]
     assert not caplog.records
@@ -308,7 +308,7 @@ def test_rules_that_fail_cost_neither_marks_nor_the_job(
     rules: Callable[[object], tuple[str, ...]], little: bool, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = find_assignment("echo-responder")
-    submission = read_submission(locate_examples("echo-responder") / "flawed", asked=asked.parts)
+    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=asked.parts)
     whole = grade(submission, asked, runner=runner)
     monkeypatch.setattr("service.grading.hints.collect_near_misses", rules)
     monkeypatch.setattr(limited_judging, "_SMALL_LIMITS", replace(limited_judging._SMALL_LIMITS, cpu_seconds=0.1))

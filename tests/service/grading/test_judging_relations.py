@@ -89,5 +89,7 @@ def test_a_robot_that_slows_down_at_the_post_needs_no_check_in_python(
     post = find_assignment("ultrasonic-stop")
     asked = criterion("relation", scenarios=["at-the-post"], **NEARER)
     slower = replace(post, criteria=(asked,))
-    graded = grade(read_submission(locate_examples(post.id) / example, asked=post.parts), slower, runner=runner)
+    graded = grade(
+        read_submission(locate_examples(post.id) / example, required_parts=post.parts), slower, runner=runner
+    )
     assert (graded.marks == 4) is good, graded.criteria[0].message

@@ -39,7 +39,7 @@ def test_what_is_there_is_graded(
     own.mkdir()
     (own / part).write_bytes((locate_examples(assignment) / "reference" / part).read_bytes())
     asked = find_assignment(assignment)
-    graded = grade(read_submission(own, asked=asked.parts), asked, runner=runner)
+    graded = grade(read_submission(own, required_parts=asked.parts), asked, runner=runner)
     assert {result.id: result.marks for result in graded.criteria} == marks
     (lacking,) = {"robot.py", "responder.py"} - {part}
     assert graded.missing == lacking
@@ -54,7 +54,7 @@ def test_what_is_there_is_graded(
 def test_a_responder_is_asked_alike_whenever_it_is_graded(runner: TrialRunner, tmp_path: Path) -> None:
     asked = find_assignment("echo-responder")
     (tmp_path / "responder.py").write_text("def responder(msg):\n    raise ValueError(msg)\n")
-    submission = read_submission(tmp_path, asked=asked.parts)
+    submission = read_submission(tmp_path, required_parts=asked.parts)
     first, second = (grade(submission, asked, runner=runner) for _ in range(2))
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
     assert "error in the responder; no robot.py" in render_plain_text(build_staff_view(first))

@@ -54,7 +54,7 @@ def test_a_submission_of_files_is_read_once(
     example: str, parsed: Counter[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, runner: TrialRunner
 ) -> None:
     assignment = find_assignment(example)
-    submission = read_submission(with_own_texts(example, tmp_path), asked=assignment.parts)
+    submission = read_submission(with_own_texts(example, tmp_path), required_parts=assignment.parts)
     decoded = counted(monkeypatch, submission_module, "decode_source")
     grade(submission, assignment, runner=runner)
     own = {text: times for text, times in parsed.items() if str(tmp_path) in text}
@@ -66,7 +66,11 @@ def test_a_notebook_is_read_once(parsed: Counter[str], tmp_path: Path, runner: T
     """Also a robot program that several lines start again."""
     assignment = find_assignment("shape-recognition")
     cells = [ANSWER, SHAPES, f"{SENSOR}  # in {tmp_path}", "%sim_magic -R", "%sim_magic -R"]
-    grade(read_submission(notebook(tmp_path / "ada.ipynb", cells), asked=assignment.parts), assignment, runner=runner)
+    grade(
+        read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=assignment.parts),
+        assignment,
+        runner=runner,
+    )
     own = {text: times for text, times in parsed.items() if str(tmp_path) in text or ANSWER in text}
     assert len(own) == 2
     assert set(own.values()) == {1}

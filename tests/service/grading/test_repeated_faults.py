@@ -104,7 +104,7 @@ def test_a_spared_trial_is_what_running_it_gives(
     (tmp_path / "ada").mkdir()
     for name, text in {"responder.py": ECHO, **files}.items():
         (tmp_path / "ada" / name).write_text(text)
-    submission = read_submission(tmp_path / "ada", asked=asked.parts)
+    submission = read_submission(tmp_path / "ada", required_parts=asked.parts)
     found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
     assert (len(spared(found, role)), len(spared(wanted, role))) == (count, 0)
     for one, other in zip(found.trials, wanted.trials, strict=True):
@@ -141,7 +141,10 @@ def test_near_its_limit_every_trial_is_run(program: str, tmp_path: Path, runner:
     text = program.replace("FEWER_TURNS", str(_turns_of(0.16))).replace("TURNS", str(_turns_of(0.24)))
     (tmp_path / "ada" / "robot.py").write_text(text)
     (tmp_path / "ada" / "responder.py").write_text(ECHO)
-    assert spared(grade(read_submission(tmp_path / "ada", asked=asked.parts), asked, runner=runner), "robot") == []
+    assert (
+        spared(grade(read_submission(tmp_path / "ada", required_parts=asked.parts), asked, runner=runner), "robot")
+        == []
+    )
 
 
 def test_how_many_hidden_trials_were_spared_is_not_told(tmp_path: Path, runner: TrialRunner) -> None:
@@ -151,7 +154,7 @@ def test_how_many_hidden_trials_were_spared_is_not_told(tmp_path: Path, runner: 
     (tmp_path / "ada").mkdir()
     (tmp_path / "ada" / "robot.py").write_text("print(wheel)")
     (tmp_path / "ada" / "responder.py").write_text(ECHO)
-    graded = grade(read_submission(tmp_path / "ada", asked=asked.parts), asked, runner=runner)
+    graded = grade(read_submission(tmp_path / "ada", required_parts=asked.parts), asked, runner=runner)
     assert len(spared(graded, "robot")) == len(graded.trials) - 2
     visible = [each for each in graded.trials if each.visibility == "visible"]
     assert any(f"in {len(visible) - 2} of {len(visible)} trials" in note for note in graded.notes)

@@ -104,7 +104,7 @@ def _graded(web: Web) -> dict[str, str]:
 
 def _regraded(web: Web) -> dict[str, str]:
     made = _graded(web)
-    acting.publish(web.store, made["batch_id"], anyway=True)
+    acting.publish(web.store, made["batch_id"], includes_unjudged=True)
     acting.regrade(web.store, made["batch_id"])
     grade_all(web, report_builders.faulty_grade())
     return made

@@ -145,14 +145,16 @@ def test_nothing_hidden_is_in_a_students_replay() -> None:
     secret = replace(other.trials[1].recording, printed=(TimedText(1.0, "SECRETPRINT"),))
     other = replace(other, trials=(other.trials[0], replace(other.trials[1], recording=secret)))
     for view, told in ((build_student_view(mine), False), (build_staff_view(mine), True)):
-        replay = build_grade_replay(view, others=select_overlay_trials(view, other, "other", BEFORE_PUBLICATION))
+        replay = build_grade_replay(
+            view, overlay_trials=select_overlay_trials(view, other, "other", BEFORE_PUBLICATION)
+        )
         assert ("SECRETPRINT" in json.dumps(replay)) is told
 
 
 def test_of_the_other_trial_there_is_what_is_drawn_and_told_and_no_more() -> None:
     view, other = build_student_view(build.line_follower_grade()), parting_grade()
     others = select_overlay_trials(view, other, "attempt 1", BEFORE_PUBLICATION)
-    replay = data_of(render_report_page(view, {}, build.faulty_submission(), others=others))
+    replay = data_of(render_report_page(view, {}, build.faulty_submission(), overlay_trials=others))
     assert replay["version"] == 1
     over = replay["trials"][1]["over"]
     assert over.keys() == {
@@ -172,21 +174,21 @@ def test_without_another_there_is_no_word_of_one() -> None:
     view = build_student_view(build.line_follower_grade())
     assert all("over" not in trial for trial in build_grade_replay(view)["trials"])
     only = OverlayTrials("attempt 1", {1: parting_grade().trials[1]})
-    assert ["over" in trial for trial in build_grade_replay(view, others=only)["trials"]] == [False, True]
+    assert ["over" in trial for trial in build_grade_replay(view, overlay_trials=only)["trials"]] == [False, True]
 
 
 def test_another_trial_takes_its_room_in_a_report() -> None:
     view = build_student_view(build.line_follower_grade())
     others = select_overlay_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
     alone = sum(len(compress_replay(trial)) for trial in build_grade_replay(view)["trials"])
-    assert len(build_grade_replay(view, most_bytes=alone + 100)["trials"]) == 2
-    assert len(build_grade_replay(view, most_bytes=alone + 100, others=others)["trials"]) == 1
+    assert len(build_grade_replay(view, max_bytes=alone + 100)["trials"]) == 2
+    assert len(build_grade_replay(view, max_bytes=alone + 100, overlay_trials=others)["trials"]) == 1
 
 
 def test_hostile_names_and_texts_are_visible_and_capped() -> None:
     view = build_student_view(build.hostile_grade())
     others = select_overlay_trials(view, build.hostile_grade(), build.HOSTILE * 99, BEFORE_PUBLICATION)
-    over = build_grade_replay(view, others=others)["trials"][0]["over"]
+    over = build_grade_replay(view, overlay_trials=others)["trials"][0]["over"]
     told = json.dumps(over, ensure_ascii=False)
     assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(told)
     assert len(over["name"]) <= 60

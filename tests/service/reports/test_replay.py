@@ -79,7 +79,7 @@ def test_a_report_has_the_worst_trial_and_as_many_others_as_there_is_room_for() 
     assert [trial["trial"] for trial in every["trials"]] == [1, 2, 3, 4, 5, 6]
     assert every["first"] == 4
     assert len(every["floors"]) == 1
-    one = build_grade_replay(build_student_view(grade), most_bytes=1)
+    one = build_grade_replay(build_student_view(grade), max_bytes=1)
     assert [trial["trial"] for trial in one["trials"]] == [5]
     assert (one["first"], one["of"]) == (0, 6)
 
@@ -201,7 +201,7 @@ def test_speech_and_prints_are_told_apart_and_faults_name_their_cell() -> None:
     files = collect_file_sources(
         SourceFile("robot.py", "print('one')\nsay('one')\n"), SourceFile("responder.py", "print('one')\n")
     )
-    found = files.find_writing_line("one", spoken=True)
+    found = files.find_writing_line("one", is_spoken=True)
     assert found is not None
     assert (found.source, found.line) == (0, 2)
     cells = (Cell(1, "import x"), Cell(2, " "), Cell(3, "%%sim_magic_preloaded -b Loop\nprint('go')"))

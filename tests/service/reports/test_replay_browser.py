@@ -317,7 +317,7 @@ def report_of_two(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("over") / "report.html"
     view = build_student_view(build.line_follower_grade())
     others = select_overlay_trials(view, parting_grade(), "attempt 1", BEFORE_PUBLICATION)
-    file.write_text(render_report_page(view, {}, build.faulty_submission(), others=others))
+    file.write_text(render_report_page(view, {}, build.faulty_submission(), overlay_trials=others))
     return file
 
 
@@ -388,7 +388,7 @@ def test_hostile_texts_of_the_other_trial_run_nothing(
 ) -> None:
     view = build_student_view(build.faulty_grade())
     honest = build_grade_replay(
-        view, others=select_overlay_trials(view, build.astray_grade(), "attempt 1", BEFORE_PUBLICATION)
+        view, overlay_trials=select_overlay_trials(view, build.astray_grade(), "attempt 1", BEFORE_PUBLICATION)
     )
     file = tmp_path / "replay.html"
     file.write_text(render_replay_page(poisoned(honest, HOSTILE)))

@@ -163,15 +163,15 @@ def server(store: Store) -> Store:
 
 
 def _set_marks(session: Session, job_id: str, actor: str, seen: int) -> None:
-    overrides.set_marks(session, job_id, CRITERION, Decimal(0), "because", actor, seen=seen)
+    overrides.set_marks(session, job_id, CRITERION, Decimal(0), "because", actor, expected_override=seen)
 
 
 def _excuse(session: Session, job_id: str, actor: str, seen: int) -> None:
-    overrides.excuse_criterion(session, job_id, CRITERION, "because", actor, seen=seen)
+    overrides.excuse_criterion(session, job_id, CRITERION, "because", actor, expected_override=seen)
 
 
 def _withdraw(session: Session, job_id: str, actor: str, seen: int) -> None:
-    overrides.withdraw_override(session, job_id, CRITERION, actor, seen=seen)
+    overrides.withdraw_override(session, job_id, CRITERION, actor, expected_override=seen)
 
 
 def _answer_appeal(session: Session, job_id: str, actor: str, seen: int) -> None:
@@ -306,7 +306,7 @@ def test_a_submission_over_a_limit_is_either_graded_for_staff_or_removed_for_a_n
 ) -> None:
     def submit(number: int) -> str:
         request = grading_request("ada", f"print({number})\n")
-        return intake.accept_submission(server, request, max_attempts=1, most_bytes=10**6).job_id
+        return intake.accept_submission(server, request, max_attempts=1, max_bytes=10**6).job_id
 
     submit(1)
     _finish_next(server, "worker")

@@ -173,7 +173,7 @@ def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excuse
     for program in ("one", "two"):
         job_id = _submit(store, program)
         _end_next(store)
-        acting.publish_one(store, job_id, actor="grace", anyway=True)
+        acting.publish_one(store, job_id, actor="grace", includes_unjudged=True)
     passback.send_marks(store, link, 1, "echo-responder")
     assert [score.marks for score in sent] == [GRADE.marks]
     with store.transaction() as session:

@@ -341,7 +341,7 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     assert "<script>alert" not in page
     with web.store.transaction() as session:
         open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
-        open_assignments.hide_names(session, 1, "echo-responder", hidden=True)
+        open_assignments.hide_names(session, 1, "echo-responder", names_hidden=True)
     hidden = words(grace.get(path).text)
     assert "1 similar pair" in hidden
     assert not is_named("ada", hidden)

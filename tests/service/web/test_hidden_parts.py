@@ -107,7 +107,7 @@ def _answers(
         graded = _unjudged(grade(submission, assignment, secret=load_secret(web.store), runner=runner))
         jobs.finish_job(web.store, claim, results.prepare_grade(graded), datetime.now(UTC))
         found |= asked.everything("graded")
-        acting.publish(web.store, batch_id, actor="grace", anyway=True)
+        acting.publish(web.store, batch_id, actor="grace", includes_unjudged=True)
         found |= asked.everything("published")
         for form in ("moodle", "gradescope"):
             found[form] = acting.export_file(web.store, batch_id, form, published=False).data.decode()

@@ -20,9 +20,9 @@ def list_name_arguments(call: ast.Call, calls: Set[str]) -> Iterator[tuple[str, 
     Elements of lists, tuples and dictionaries are separate arguments.
     """
     for name in sorted(calls & MAY_TAKE_NAME.keys()):
-        starred = next((at for at, each in enumerate(call.args) if isinstance(each, ast.Starred)), len(call.args))
-        for at, argument in enumerate(call.args):
-            if at in MAY_TAKE_NAME[name] or at >= starred:
+        first_starred = next((at for at, each in enumerate(call.args) if isinstance(each, ast.Starred)), len(call.args))
+        for index, argument in enumerate(call.args):
+            if index in MAY_TAKE_NAME[name] or index >= first_starred:
                 yield from ((name, part) for part in _list_parts(argument))
         for keyword in call.keywords:
             if keyword.arg is None or (name in NAME_IN_ANY_KEYWORD and keyword.arg not in NAME_KEYWORDS):
@@ -43,12 +43,12 @@ def _list_parts(node: ast.expr) -> Iterator[ast.expr]:
 
 def may_unpickle(call: ast.Call, calls: Set[str]) -> bool:
     """Return whether a call lets NumPy load pickled objects, or may do so."""
-    given = [keyword.value for keyword in call.keywords if keyword.arg == "allow_pickle"]
+    values = [keyword.value for keyword in call.keywords if keyword.arg == "allow_pickle"]
     for name in calls & MAY_UNPICKLE.keys():
-        given += call.args[MAY_UNPICKLE[name] :]
-        given += [each for each in call.args if isinstance(each, ast.Starred)]
-        given += [keyword.value for keyword in call.keywords if keyword.arg is None]
-    return not all(isinstance(value, ast.Constant) and not value.value for value in given)
+        values += call.args[MAY_UNPICKLE[name] :]
+        values += [each for each in call.args if isinstance(each, ast.Starred)]
+        values += [keyword.value for keyword in call.keywords if keyword.arg is None]
+    return not all(isinstance(value, ast.Constant) and not value.value for value in values)
 
 
 def is_text_expression(node: ast.AST) -> bool:

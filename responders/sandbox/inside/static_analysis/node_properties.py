@@ -91,14 +91,14 @@ def evaluate_condition(node: ast.AST) -> bool | None:
         case ast.Constant(value=value):
             return bool(value)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            known = evaluate_condition(operand)
-            return None if known is None else not known
+            operand_value = evaluate_condition(operand)
+            return None if operand_value is None else not operand_value
         case ast.BoolOp(op=operator, values=values):
-            decides = isinstance(operator, ast.Or)
+            deciding_value = isinstance(operator, ast.Or)
             known_values = [evaluate_condition(value) for value in values]
-            if decides in known_values:
-                return decides
-            return None if None in known_values else not decides
+            if deciding_value in known_values:
+                return deciding_value
+            return None if None in known_values else not deciding_value
         case ast.List(elts=[]) | ast.Tuple(elts=[]) | ast.Dict(keys=[]):
             return False
         case ast.Compare(left=ast.Constant(value=left), ops=[operator], comparators=[ast.Constant(value=right)]):
@@ -148,8 +148,8 @@ def is_block_end(statement: ast.stmt) -> bool:
         case ast.Expr(value=ast.Call(func=function)):
             return find_dotted_name(function) in _EXIT_FUNCTIONS
         case ast.If(test=test, body=body, orelse=orelse):
-            ways = {True: (body,), False: (orelse,), None: (body, orelse)}[evaluate_condition(test)]
-            return all(any(map(is_block_end, way)) for way in ways)
+            branches = {True: (body,), False: (orelse,), None: (body, orelse)}[evaluate_condition(test)]
+            return all(any(map(is_block_end, way)) for way in branches)
         case ast.While(test=test):
             return evaluate_condition(test) is True and not any(
                 isinstance(each, ast.Break) for each in ast.walk(statement)
@@ -181,17 +181,17 @@ def collect_bound_names(body: Sequence[ast.AST]) -> set[str]:
     Unreachable code binds no names.
     """
     names: set[str] = set()
-    waiting = list(reversed(body))
-    while waiting:
-        node = waiting.pop()
+    pending_nodes = list(reversed(body))
+    while pending_nodes:
+        node = pending_nodes.pop()
         names |= collect_node_bindings(node)
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             continue
         if isinstance(node, (ast.Lambda, *_COMPREHENSIONS)):
             names |= {each.target.id for each in ast.walk(node) if isinstance(each, ast.NamedExpr)}
             continue
-        dead = {id(statement) for block, live in list_blocks(node) if not live for statement in block}
-        waiting += [child for child in ast.iter_child_nodes(node) if id(child) not in dead]
+        dead_statements = {id(statement) for block, live in list_blocks(node) if not live for statement in block}
+        pending_nodes += [child for child in ast.iter_child_nodes(node) if id(child) not in dead_statements]
     return names
 
 
@@ -221,32 +221,36 @@ def collect_defined_names(tree: ast.Module) -> set[str]:
     Excludes names imported under their own name, and instances of classes that it doesn't define.
     """
     nodes = list(ast.walk(tree))
-    made = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
+    names = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
     for node in nodes:
         match node:
             case ast.Assign(targets=targets, value=value):
-                made |= {name for target in targets for name in _collect_assigned_names(target, value, made)}
+                names |= {name for target in targets for name in _collect_assigned_names(target, value, names)}
             case ast.AnnAssign(target=target, value=ast.expr() as value) | ast.NamedExpr(target=target, value=value):
-                made |= _collect_assigned_names(target, value, made)
+                names |= _collect_assigned_names(target, value, names)
             case ast.For(target=target) | ast.AsyncFor(target=target):
-                made |= collect_bound_names([target])
+                names |= collect_bound_names([target])
             case ast.Import(names=aliases) | ast.ImportFrom(names=aliases):
-                made |= {each.asname for each in aliases if each.asname and not _is_last_part(each.name, each.asname)}
-    return made
+                names |= {each.asname for each in aliases if each.asname and not _is_last_part(each.name, each.asname)}
+    return names
 
 
-def _collect_assigned_names(target: ast.expr, value: ast.expr, made: Set[str]) -> set[str]:
+def _collect_assigned_names(target: ast.expr, value: ast.expr, defined_names: Set[str]) -> set[str]:
     match target, value:
         case ((ast.Tuple(elts=targets) | ast.List(elts=targets)), (ast.Tuple(elts=values) | ast.List(elts=values))):
             pairs = zip(targets, values, strict=False)
-            return {name for one, other in pairs for name in _collect_assigned_names(one, other, made)}
+            return {name for one, other in pairs for name in _collect_assigned_names(one, other, defined_names)}
         case ast.Name(id=name), ast.Call(func=function):
             kind = find_dotted_name(function).rpartition(".")[2]
-            is_instance = kind[:1].isupper() and kind not in made and find_root_name(function) not in made
+            is_instance = (
+                kind[:1].isupper() and kind not in defined_names and find_root_name(function) not in defined_names
+            )
             return set() if is_instance else {name}
         case ast.Name(id=name), ast.Attribute():
             return (
-                set() if _is_last_part(find_dotted_name(value), name) and find_root_name(value) not in made else {name}
+                set()
+                if _is_last_part(find_dotted_name(value), name) and find_root_name(value) not in defined_names
+                else {name}
             )
     return collect_bound_names([target])
 
@@ -272,5 +276,5 @@ def collect_parameters(function: ast.FunctionDef | ast.AsyncFunctionDef | ast.La
 
 def collect_outer_names(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
     """Return the names that a function declares global or nonlocal."""
-    found = (node.names for node in ast.walk(function) if isinstance(node, ast.Global | ast.Nonlocal))
-    return {name for names in found for name in names}
+    name_lists = (node.names for node in ast.walk(function) if isinstance(node, ast.Global | ast.Nonlocal))
+    return {name for names in name_lists for name in names}

@@ -38,14 +38,17 @@ Places = Mapping[str, Mapping[str, SourcePlace]]
 
 
 def read(
-    files: Sequence[Mapping[str, Any]], asked: Mapping[str, Sequence[str]], ran: Sequence[Sequence[Any]] | None = None
+    files: Sequence[Mapping[str, Any]],
+    rules: Mapping[str, Sequence[str]],
+    executed_statements: Sequence[Sequence[Any]] | None = None,
 ) -> dict[str, Any]:
-    """Return the places for the rules in ``asked``.
+    """Return the places for the rules in ``rules``.
 
     Args:
         files: Each has a ``name`` (empty for the main part) and a ``text``, ``bytes`` (as Latin-1) or ``cells``.
-        asked: Lists of rules: ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown`` and ``entries``.
-        ran: The executed statements (file, line, column), if known. Then only these count as used or called in a loop.
+        rules: Lists of rules: ``uses``, ``avoids``, ``in_loop``, ``defines``, ``shown`` and ``entries``.
+        executed_statements: The executed statements (file, line, column), if known. Then only these count as used or
+            called in a loop.
 
     Returns:
         For each rule the file name and line, or None. ``unread`` is the first unreadable file and the reason. Invalid
@@ -53,21 +56,25 @@ def read(
     """
     reading = _SubmissionReader(files)
     units = reading.units
-    everything = _collect_first_places(
+    all_places = _collect_first_places(
         (mention, places[0]) for unit in units for mention, places in unit.mentions.items()
     )
-    run = _collect_first_places(
-        _collect_reachable(units, asked["entries"], None if ran is None else {(name, (*at,)) for name, *at in ran})
+    reachable_places = _collect_first_places(
+        _collect_reachable(
+            units,
+            rules["entries"],
+            None if executed_statements is None else {(name, (*at,)) for name, *at in executed_statements},
+        )
     )
-    given = _exclude_own_names(run, reading.made - set(asked["defines"]), reading.own)
+    foreign_places = _exclude_own_names(reachable_places, reading.made - set(rules["defines"]), reading.own)
     return {
         "unread": reading.unread,
-        "uses": [_find_first_place(given, rule, _USED_KINDS) for rule in asked["uses"]],
-        "avoids": [_find_first_place(everything, rule, _AVOIDED_KINDS) for rule in asked["avoids"]],
-        "in_loop": [_find_first_place(given, rule, {"()": ("looped",)}) for rule in asked["in_loop"]],
-        "defines": [_format_place(run["function"].get(name)) for name in asked["defines"]],
-        "shown": [_find_first_place(everything, rule, _AVOIDED_KINDS) for rule in asked["shown"]],
-        "doubts": _collect_doubts(everything, asked["avoids"])[:_MOST_DOUBTS] if asked["avoids"] else [],
+        "uses": [_find_first_place(foreign_places, rule, _USED_KINDS) for rule in rules["uses"]],
+        "avoids": [_find_first_place(all_places, rule, _AVOIDED_KINDS) for rule in rules["avoids"]],
+        "in_loop": [_find_first_place(foreign_places, rule, {"()": ("looped",)}) for rule in rules["in_loop"]],
+        "defines": [_format_place(reachable_places["function"].get(name)) for name in rules["defines"]],
+        "shown": [_find_first_place(all_places, rule, _AVOIDED_KINDS) for rule in rules["shown"]],
+        "doubts": _collect_doubts(all_places, rules["avoids"])[:_MOST_DOUBTS] if rules["avoids"] else [],
     }
 
 
@@ -85,31 +92,31 @@ class _SubmissionReader:
 
     def _read_file(self, file: Mapping[str, Any]) -> None:
         name = str(file["name"])
-        walk = SyntaxWalker(self._describe_doubt)
+        walker = SyntaxWalker(self._describe_doubt)
         if "cells" in file:
             for number, cell in file["cells"]:
-                self._read_cell(walk, f"cell {number}", cell)
+                self._read_cell(walker, f"cell {number}", cell)
         else:
             source = file["bytes"].encode("latin-1") if "bytes" in file else file["text"]
             tree = self._parse_source(source, name)
             if tree is not None:
                 unit = CodeUnit(name.partition(".")[0], always=not name)
-                self._run_walk(name, lambda: walk.read_tree(tree, name, unit))
-        self.units += walk.units
-        self.made |= walk.made
-        for written, text in walk.written:
-            self.own.add(written.partition(".")[0])
-            self._read_file({"name": written or "a file", "text": text})
+                self._run_walk(name, lambda: walker.read_tree(tree, name, unit))
+        self.units += walker.units
+        self.made |= walker.made
+        for file_name, text in walker.written:
+            self.own.add(file_name.partition(".")[0])
+            self._read_file({"name": file_name or "a file", "text": text})
 
-    def _read_cell(self, walk: SyntaxWalker, name: str, cell: str) -> None:
+    def _read_cell(self, walker: SyntaxWalker, name: str, cell: str) -> None:
         magic = cell_source.parse_cell_magic(cell)
         unit = CodeUnit("", always=True)
         if magic is not None:
-            self._run_walk(name, lambda: walk.read_magic(magic, name, unit))
+            self._run_walk(name, lambda: walker.read_magic(magic, name, unit))
             return
         tree = self._parse_source(cell_source.convert_to_python(cell), name)
         if tree is not None:
-            self._run_walk(name, lambda: walk.read_tree(tree, name, unit))
+            self._run_walk(name, lambda: walker.read_tree(tree, name, unit))
 
     def _parse_source(self, source: str | bytes, name: str) -> ast.Module | None:
         self._left -= len(source)
@@ -140,9 +147,9 @@ class _SubmissionReader:
         finally:
             sys.setrecursionlimit(limit)
 
-    def _record_unreadable(self, name: str, why: str, line: int | None = None) -> None:
+    def _record_unreadable(self, name: str, reason: str, line: int | None = None) -> None:
         if self.unread is None:
-            self.unread = [name[:_LONGEST_NAME], why, line]
+            self.unread = [name[:_LONGEST_NAME], reason, line]
 
     def _describe_doubt(self, module: str) -> str:
         top = module.partition(".")[0]
@@ -158,56 +165,60 @@ class _SubmissionReader:
 
 
 def _collect_reachable(
-    units: Sequence[CodeUnit], entries: Sequence[str], ran: Set[tuple[Any, ...]] | None
+    units: Sequence[CodeUnit], entries: Sequence[str], executed_statements: Set[tuple[Any, ...]] | None
 ) -> Iterable[tuple[Mention, SourcePlace]]:
-    """Yield the mentions in code that may run, or that ``ran``. ``looped`` is True if a loop reaches it.
+    """Yield the mentions in code that may run, or in the ``executed_statements``, and whether a loop reaches each.
 
     A function may run if reachable code uses its name, regardless of the object. If any name may be looked up, all
     functions may run.
     """
-    any_name = any(mention.kind == "any_name" for unit in units for mention in unit.mentions)
-    by_name: dict[str, list[CodeUnit]] = defaultdict(list)
+    has_any_name = any(mention.kind == "any_name" for unit in units for mention in unit.mentions)
+    units_by_name: dict[str, list[CodeUnit]] = defaultdict(list)
     for unit in units:
-        by_name[unit.name].append(unit)
+        units_by_name[unit.name].append(unit)
         if unit.owner and unit.name.startswith("__"):
-            by_name[unit.owner].append(unit)
-    used: dict[str, bool] = {}  # names, and whether in a loop
-    looped: dict[CodeUnit, bool] = {}  # reachable units, and whether through a loop
+            units_by_name[unit.owner].append(unit)
+    used_names: dict[str, bool] = {}  # names, and whether in a loop
+    reachable_units: dict[CodeUnit, bool] = {}  # reachable units, and whether through a loop
 
-    def way_to(unit: CodeUnit) -> bool | None:
+    def is_loop_reached(unit: CodeUnit) -> bool | None:
         """Return whether a loop reaches the unit, or None if nothing does."""
-        if not unit.made or (unit.made_in is not None and unit.made_in not in looped):
+        if not unit.made or (unit.made_in is not None and unit.made_in not in reachable_units):
             return None
         names = (unit.name, unit.owner) if unit.name.startswith("__") else (unit.name,)
-        ways = [used[name] for name in names if name in used]
-        entry = unit.made_in is not None and any(fnmatchcase(unit.name, pattern) for pattern in entries)
-        return any(ways) if ways or entry or unit.always or any_name else None
+        loop_flags = [used_names[name] for name in names if name in used_names]
+        is_entry = unit.made_in is not None and any(fnmatchcase(unit.name, pattern) for pattern in entries)
+        return any(loop_flags) if loop_flags or is_entry or unit.always or has_any_name else None
 
-    def run_in(unit: CodeUnit) -> Iterator[tuple[Mention, SourcePlace]]:
+    def list_run_mentions(unit: CodeUnit) -> Iterator[tuple[Mention, SourcePlace]]:
         for mention, places in unit.mentions.items():
             if mention.live:
-                was_run = (each for each in places if ran is None or (each.file, each.statement) in ran)
-                yield from ((mention, place) for place in itertools.islice(was_run, 1))
+                run_places = (
+                    each
+                    for each in places
+                    if executed_statements is None or (each.file, each.statement) in executed_statements
+                )
+                yield from ((mention, place) for place in itertools.islice(run_places, 1))
 
-    waiting = list(units)
-    while waiting:
-        unit = waiting.pop()
-        way = way_to(unit)
-        if way is None or (unit in looped and looped[unit] >= way):
+    pending_units = list(units)
+    while pending_units:
+        unit = pending_units.pop()
+        is_looped = is_loop_reached(unit)
+        if is_looped is None or (unit in reachable_units and reachable_units[unit] >= is_looped):
             continue
-        looped[unit] = way
-        waiting += unit.units
-        for mention, _ in run_in(unit):
+        reachable_units[unit] = is_looped
+        pending_units += unit.units
+        for mention, _ in list_run_mentions(unit):
             if mention.kind in ("construct", "function", "doubt", "any_name"):
                 continue
-            in_loop = way or mention.looped
+            in_loop = is_looped or mention.looped
             for name in mention.name.split("."):
-                if name not in used or used[name] < in_loop:
-                    used[name] = in_loop
-                    waiting += by_name.get(name, ())
-    for unit, way in looped.items():
-        for mention, place in run_in(unit):
-            yield mention._replace(looped=way or mention.looped), place
+                if name not in used_names or used_names[name] < in_loop:
+                    used_names[name] = in_loop
+                    pending_units += units_by_name.get(name, ())
+    for unit, is_looped in reachable_units.items():
+        for mention, place in list_run_mentions(unit):
+            yield mention._replace(looped=is_looped or mention.looped), place
 
 
 #: The kinds of mention that have a name.
@@ -218,35 +229,35 @@ _AVOIDED_KINDS = {"()": ("call", "handed_on", "base"), _IMPORT: ("import", "thro
 
 
 def _collect_first_places(mentions: Iterable[tuple[Mention, SourcePlace]]) -> Places:
-    found: dict[str, dict[str, SourcePlace]] = defaultdict(dict)
+    first_places: dict[str, dict[str, SourcePlace]] = defaultdict(dict)
     for mention, place in mentions:
         for kind in (mention.kind, "looped") if mention.kind == "call" and mention.looped else (mention.kind,):
-            found[kind][mention.name] = min(place, found[kind].get(mention.name, place))
-    return found
+            first_places[kind][mention.name] = min(place, first_places[kind].get(mention.name, place))
+    return first_places
 
 
-def _exclude_own_names(places: Places, made: Set[str], own: Set[str]) -> Places:
+def _exclude_own_names(places: Places, defined_names: Set[str], own_modules: Set[str]) -> Places:
     """Return the places without names that the submission defines itself."""
 
-    def is_made(name: str) -> bool:
-        first, last = name.partition(".")[0], name.rpartition(".")[2]
-        return first in made or (first in own and (last in made or last == first))
+    def is_own_name(name: str) -> bool:
+        root, attribute = name.partition(".")[0], name.rpartition(".")[2]
+        return root in defined_names or (root in own_modules and (attribute in defined_names or attribute == root))
 
-    kept = {
-        kind: {name: place for name, place in found.items() if kind not in _NAMED_KINDS or not is_made(name)}
+    foreign_places = {
+        kind: {name: place for name, place in found.items() if kind not in _NAMED_KINDS or not is_own_name(name)}
         for kind, found in places.items()
     }
-    return defaultdict(dict, kept)
+    return defaultdict(dict, foreign_places)
 
 
 def _find_first_place(places: Places, rule: str, kinds: Mapping[str, Sequence[str]]) -> PlaceRow:
     if rule in _CONSTRUCTS:
         return _format_place(places["construct"].get(rule))
     form = "()" if rule.endswith("()") else _IMPORT if rule.startswith(_IMPORT) else ""
-    fits = [
+    matches = [
         place for kind in kinds.get(form, ()) for name, place in places[kind].items() if _MATCHERS[form](name, rule)
     ]
-    return _format_place(min(fits, default=None))
+    return _format_place(min(matches, default=None))
 
 
 def _is_called(name: str, rule: str) -> bool:
@@ -271,21 +282,21 @@ def _parse_module_name(rule: str) -> str:
 
 def _collect_doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
     """Return places that may match or hide what a rule avoids: file, line and description, in file order."""
-    found: dict[SourcePlace, str] = {}
+    doubts: dict[SourcePlace, str] = {}
     for kind in ("doubt", "any_name"):
-        for what, place in places[kind].items():
-            found.setdefault(place, what)
+        for description, place in places[kind].items():
+            doubts.setdefault(place, description)
     for rule in rules:
-        for what, place in _list_look_alikes(places, rule):
-            found.setdefault(place, what)
-    return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(found.items())]
+        for description, place in _list_look_alikes(places, rule):
+            doubts.setdefault(place, description)
+    return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(doubts.items())]
 
 
 def _list_look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePlace]]:
     if rule.endswith("()"):
         yield from ((name, place) for name, place in places["unsure"].items() if _is_called(name, rule))
-        owner, _, last = rule.removesuffix("()").rpartition(".")
-        if owner and any(_is_called(name, f"{last}()") for name in places["call"]):
+        owner, _, attribute = rule.removesuffix("()").rpartition(".")
+        if owner and any(_is_called(name, f"{attribute}()") for name in places["call"]):
             yield from ((name, place) for name, place in places["handed_on"].items() if _is_named(name, owner))
     elif rule.startswith(_IMPORT) and "." not in _parse_module_name(rule):
         for kind in ("import", "through"):

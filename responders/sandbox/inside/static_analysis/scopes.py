@@ -46,11 +46,11 @@ class SymbolTable:
             match node:
                 case ast.Import(names=aliases):
                     for alias in aliases:
-                        bound = alias.asname or alias.name.partition(".")[0]
-                        self._record_alias(bound, alias.name if alias.asname else bound, imported=True)
+                        bound_name = alias.asname or alias.name.partition(".")[0]
+                        self._record_alias(bound_name, alias.name if alias.asname else bound_name, is_imported=True)
                 case ast.ImportFrom(module=module, names=aliases):
                     for alias in aliases:
-                        self._record_alias(alias.asname or alias.name, f"{module or ''}.{alias.name}", imported=True)
+                        self._record_alias(alias.asname or alias.name, f"{module or ''}.{alias.name}", is_imported=True)
                 case ast.Assign(targets=targets, value=value):
                     for target in targets:
                         self._record_assignment(target, value)
@@ -70,17 +70,17 @@ class SymbolTable:
 
     def resolve_names(self, node: ast.AST) -> list[str]:
         """Return the dotted name of a chain, followed by its names with the first part replaced by known aliases."""
-        found = [find_dotted_name(node)]
-        waiting = list(found) if find_root_name(node) else []
-        while waiting and len(found) < _MOST_NAMES:
-            first, dot, rest = waiting.pop().partition(".")
-            for other in sorted(self._stands_for.get(first, ())):
-                whole = f"{other}{dot}{rest}"
-                if whole not in found:
-                    found.append(whole)
+        names = [find_dotted_name(node)]
+        pending_names = list(names) if find_root_name(node) else []
+        while pending_names and len(names) < _MOST_NAMES:
+            root, dot, rest = pending_names.pop().partition(".")
+            for target in sorted(self._stands_for.get(root, ())):
+                full_name = f"{target}{dot}{rest}"
+                if full_name not in names:
+                    names.append(full_name)
                     # A name assigned from its own part (x = x.next) would loop forever.
-                    waiting += [whole] if other.partition(".")[0] != first else []
-        return found
+                    pending_names += [full_name] if target.partition(".")[0] != root else []
+        return names
 
     def is_imported(self, node: ast.AST) -> bool:
         """Return whether a chain begins with an imported name."""
@@ -105,12 +105,12 @@ class SymbolTable:
         names = self.resolve_names(node)
         if self.is_text(node) or not find_root_name(node):
             return False
-        own = any(name.rpartition(".")[2] in self._functions for name in names)
-        return own or self.may_be_imported(node) or hasattr(builtins, find_root_name(node))
+        is_own = any(name.rpartition(".")[2] in self._functions for name in names)
+        return is_own or self.may_be_imported(node) or hasattr(builtins, find_root_name(node))
 
     def is_own(self, name: str) -> bool | None:
         """Return whether a name read here is defined by this file; None if unknown."""
-        later = False
+        is_later = False
         for scope in reversed(self._scopes[1:]):
             if scope.kind == "class":
                 if scope is self._scopes[-1] and name in scope.so_far:
@@ -118,17 +118,17 @@ class SymbolTable:
                 continue
             if name in scope.bound:
                 return True
-            later = later or scope.kind == "function"
+            is_later = is_later or scope.kind == "function"
         module = self._scopes[0]
         if name in module.sure and name not in self._unsure:
             return True
-        unsure = name in module.so_far or (later and (name in module.bound or name in self._unsure))
-        return None if unsure else False
+        is_unsure = name in module.so_far or (is_later and (name in module.bound or name in self._unsure))
+        return None if is_unsure else False
 
     @contextlib.contextmanager
-    def scope(self, kind: str, bound: set[str] | None = None) -> Iterator[None]:
-        """Enter a new scope. ``bound`` are the names that it binds anywhere."""
-        self._scopes.append(_Scope(kind, bound or set()))
+    def scope(self, kind: str, bound_names: set[str] | None = None) -> Iterator[None]:
+        """Enter a new scope. ``bound_names`` are the names that it binds anywhere."""
+        self._scopes.append(_Scope(kind, bound_names or set()))
         yield
         self._scopes.pop()
 
@@ -136,26 +136,26 @@ class SymbolTable:
     def block(self) -> Iterator[None]:
         """Enter code that may not run. The names that it binds are not sure after it."""
         scope = self._scopes[-1]
-        before = set(scope.sure)
+        sure_names = set(scope.sure)
         yield
-        scope.sure = before
+        scope.sure = sure_names
 
-    def bind(self, names: set[str], *, sure: bool = True) -> None:
+    def bind(self, names: set[str], *, is_sure: bool = True) -> None:
         """Mark these names as bound from here on, or possibly bound."""
         scope = self._scopes[-1]
         scope.so_far |= names
-        if sure:
+        if is_sure:
             scope.sure |= names
 
-    def _record_alias(self, name: str, stands_for: str, *, imported: bool = False) -> None:
-        self._stands_for.setdefault(name, set()).add(stands_for)
-        if imported:
+    def _record_alias(self, name: str, target: str, *, is_imported: bool = False) -> None:
+        self._stands_for.setdefault(name, set()).add(target)
+        if is_imported:
             self._imported.add(name)
 
     def _record_assignment(self, target: ast.AST, value: ast.AST) -> None:
         if isinstance(target, ast.Tuple | ast.List) and isinstance(value, ast.Tuple | ast.List):
-            for one, other in zip(target.elts, value.elts, strict=False):
-                self._record_assignment(one, other)
+            for target_part, value_part in zip(target.elts, value.elts, strict=False):
+                self._record_assignment(target_part, value_part)
         elif isinstance(target, ast.Name):
             if isinstance(value, ast.Call) and find_dotted_name(value.func) in TABLE_CALLS:
                 self._record_alias(target.id, find_dotted_name(value.func))
@@ -167,9 +167,9 @@ class SymbolTable:
                 self._texts.add(target.id)
 
     def _record_defaults(self, arguments: ast.arguments) -> None:
-        given = [*arguments.posonlyargs, *arguments.args]
-        with_default = given[len(given) - len(arguments.defaults) :]
-        pairs = [*zip(with_default, arguments.defaults, strict=True)]
+        positional = [*arguments.posonlyargs, *arguments.args]
+        optional = positional[len(positional) - len(arguments.defaults) :]
+        pairs = [*zip(optional, arguments.defaults, strict=True)]
         pairs += [(one, each) for one, each in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if each]
         for argument, default in pairs:
             if find_root_name(default):

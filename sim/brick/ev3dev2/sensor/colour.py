@@ -18,19 +18,19 @@ def _compute_hue(red: float, green: float, blue: float, most: float, spread: flo
 def to_hsv(red: float, green: float, blue: float) -> list[int]:
     """Return hue 0..359, saturation and value 0..100."""
     red, green, blue = red / 255, green / 255, blue / 255
-    most = max(red, green, blue)
-    spread = most - min(red, green, blue)
-    saturation = spread / most if most else 0.0
-    return [int(_compute_hue(red, green, blue, most, spread)), int(saturation * 100), int(most * 100)]
+    maximum = max(red, green, blue)
+    spread = maximum - min(red, green, blue)
+    saturation = spread / maximum if maximum else 0.0
+    return [int(_compute_hue(red, green, blue, maximum, spread)), int(saturation * 100), int(maximum * 100)]
 
 
 def to_hls(red: float, green: float, blue: float) -> list[int]:
     """Return hue 0..359, lightness and saturation 0..100. The saturation of black and white is 0."""
     red, green, blue = red / 255, green / 255, blue / 255
-    most, least = max(red, green, blue), min(red, green, blue)
-    spread, lightness = most - least, (most + least) / 2
+    maximum, minimum = max(red, green, blue), min(red, green, blue)
+    spread, lightness = maximum - minimum, (maximum + minimum) / 2
     saturation = 0.0 if spread == 0 else spread / (1 - abs(2 * lightness - 1))
-    return [int(_compute_hue(red, green, blue, most, spread)), int(lightness * 100), int(saturation * 100)]
+    return [int(_compute_hue(red, green, blue, maximum, spread)), int(lightness * 100), int(saturation * 100)]
 
 
 def to_lab(red: float, green: float, blue: float) -> list[int]:
