@@ -136,7 +136,7 @@ def check_no_names_hidden(session: Session, actor: Actor, course_id: int) -> Non
     if assignment is not None:
         raise Invalid(
             "names are hidden for %(assignment)s, and this could show who submitted to it; show the names first, or "
-            "ask an operator to do this with a command",
+            "ask an operator",
             assignment=assignment,
         )
 
