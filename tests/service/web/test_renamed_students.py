@@ -85,7 +85,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
         def called(names: HiddenNames, assignment: str, student: str) -> str:
             return labels[student] if assignment in names.assignments else student
 
-        patch.setattr(HiddenNames, "called", called)
+        patch.setattr(HiddenNames, "label_student", called)
         asked = _Asked(web, course)
         before = asked.everything()
         renamed = dict(zip(_EVERYBODY, reversed(_EVERYBODY), strict=True))
