@@ -25,8 +25,9 @@ from sim.recording import Verdict
 _POLL_SECONDS = 0.02
 #: Bytes per read. Most frames are far shorter.
 _READ_BYTES = 8192
-#: Minimum CPU seconds charged per frame, per byte and per action in a packet. They are slightly above the worker's
-#: costs for reading, so a child pays for the many or long frames that it sends.
+#: Minimum CPU seconds charged per frame in either direction, per byte and per action in a packet. They are about the
+#: worker's costs, so a child pays for the many or long frames that it sends and for the replies. Calls of the robot's
+#: modules use more than that in the child, so these minimums don't change their costs.
 _FRAME_CPU_SECONDS, _BYTE_CPU_SECONDS, _ACT_CPU_SECONDS = 1e-5, 1e-8, 5e-6
 _STALLED_SECONDS = 5.0
 #: Limit for reporting the last place: the child's CPU seconds, and real seconds once it is not runnable.
@@ -154,6 +155,7 @@ class Child:
 
     def _send_bytes(self, frame: bytes) -> None:
         self._sent += 1
+        self._charged += _FRAME_CPU_SECONDS
         try:
             frame = frame[os.write(self._writing, frame) :]
         except BlockingIOError:

@@ -174,6 +174,17 @@ def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running_child, "_FRAME_CPU_SECONDS", 1e-4)
 
 
+def test_frames_in_both_directions_are_charged(tmp_path: Path) -> None:
+    meter, count = JobMeter(), 200
+    with _child([b'{"do":"until_said"}'] * count, tmp_path, meter) as child:
+        for _ in range(count):
+            child.receive(wire.ROBOT)
+            child.send({"t": 0, "v": None})
+        for _ in range(count):
+            child.send_readings(0, [0.0])
+    assert meter.spent.cpu_seconds >= 3 * count * running_child._FRAME_CPU_SECONDS
+
+
 class _Sandboxes:
     """Returns the processes that a test has created."""
 
