@@ -71,7 +71,10 @@ def check_available(proc: Path = _PROC) -> str | None:
 
 
 class ControlGroup:
-    """The control group of one slot. Zygotes are started through ``command_prefix``; the processes they fork stay in it."""
+    """The control group of one slot.
+
+    Zygotes are started through ``command_prefix``; the processes they fork stay in it.
+    """
 
     def __init__(self, folder: Path, memory_mb: int) -> None:
         """Create the group.
