@@ -158,8 +158,8 @@ def _claim_oldest_delivery(session: Session, hook: Webhook, at: datetime) -> Cla
     if delivery is None:
         return None
     attempt = delivery.attempts + 1
-    values = {"attempts": attempt, "due_at": at + _LEASE, "error": None}
-    session.execute(update(Delivery).where(Delivery.id == delivery.id).values(**values))
+    mine = Delivery.id == delivery.id
+    session.execute(update(Delivery).where(mine).values(attempts=attempt, due_at=at + _LEASE, error=None))
     return ClaimedDelivery(
         delivery.id, hook.url, hook.secret, delivery.event, delivery.payload, delivery.made_at, attempt
     )
