@@ -68,7 +68,7 @@ def make_world(web: Web) -> World:
         "session_id": session_,
         "credential_id": other,
         "member_id": str(web.student("guest").enrolment_id),
-        "upload_id": _upload(web, grace),
+        "upload_id": create_upload(web, grace),
         "webhook_id": hook.id,
         "criterion": report_builders.faulty_grade().criteria[0].id,
         "comment_id": "1",
@@ -92,7 +92,7 @@ def _tryout(web: Web, member: Member) -> str:
     return asked
 
 
-def _upload(web: Web, member: Member) -> str:
+def create_upload(web: Web, member: Member) -> str:
     """Create an upload in which every submission is rejected."""
     kept_uploads = PendingUploads(web.settings.home)
     begun = kept_uploads.begin(member.person_id, 1, "echo-responder")

@@ -109,7 +109,7 @@ def rules_that_prove() -> Iterator[Rule]:
         hint_values,
     )
     for module in modules:
-        yield from (each for name, each in vars(module).items() if name.startswith("of_"))
+        yield from (each for name, each in vars(module).items() if name.startswith("hint_about_"))
 
 
 @pytest.mark.parametrize("assignment", _ASSIGNMENTS)

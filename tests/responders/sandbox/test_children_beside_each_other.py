@@ -22,7 +22,7 @@ class Noted:
     def adjust_memory_limit(self, limits_bytes: int) -> None:
         self.rooms.append(limits_bytes >> 20)
 
-    def watch(self) -> Callable[[], bool]:
+    def watch_memory_kills(self) -> Callable[[], bool]:
         return lambda: False
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ _CODE = (
     "import logging, structlog\n"
     "from service.queue.logs import print_event, configure_logging\n"
     "configure_logging('INFO')\n"
-    "announce('up.ready', 'ready: 2 gradings at a time')\n"
+    "print_event('up.ready', 'ready: 2 gradings at a time')\n"
     "structlog.get_logger('ours').warning('job.lost', job='j1')\n"
     "logging.getLogger('theirs').error('no broker')\n"
 )

@@ -143,7 +143,7 @@ def test_who_waits_for_a_process_that_does_not_answer_asks_in_the_end(
 
 def test_what_begins_for_the_question_is_what_answers_it(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     needed: list[ProgramSpec | ResponderSpec] = []
-    monkeypatch.setattr(runner, "begin", needed.extend)
+    monkeypatch.setattr(runner, "start_zygotes", needed.extend)
     known_answers.run_self_test(runner)
     assert {each.role for each in needed} == set(self_test_record.SELF_TEST_ROLES)
 
