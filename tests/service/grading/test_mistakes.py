@@ -23,7 +23,7 @@ from service.grading.trial_runner import TrialRunner
 MISTAKES = tomllib.loads((DATA / "mistakes.toml").read_text("utf-8"))["mistake"]
 
 #: Number of mistakes per assignment in the quick tests.
-_QUICK = 2
+_QUICK = 1
 
 
 def _cases() -> Iterator[ParameterSet]:
