@@ -56,6 +56,7 @@ def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: P
     assert about == load_card(name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MEASURED)
 def test_the_card_says_what_is_measured(name: str) -> None:
     result = evaluate(name)
@@ -165,6 +166,7 @@ def test_a_sheet_that_no_card_counts_is_read_as_well() -> None:
     assert np.mean(answers == [place.label for place in places]) >= 0.93
 
 
+@pytest.mark.long
 def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.ndarray]) -> None:
     trained, labels = digits.load_training_digits()
     assert np.bincount(labels).tolist() == [400] * 10

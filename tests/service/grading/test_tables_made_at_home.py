@@ -190,6 +190,7 @@ def train(images, labels):
 """
 
 
+@pytest.mark.long
 def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
     asked = find_assignment("train-a-recogniser")
     marking = tuple(criterion for criterion in asked.criteria if criterion.marks)
