@@ -248,10 +248,8 @@ def _list_submissions(folder: Path, requested_assignment: Assignment | None) -> 
         return downloads
     if requested_assignment.id not in assignment_ids:
         raise UsageError(
-            f"{folder.name}: has submissions for {', '.join(map(sanitise_name, list(assignment_ids)[:5]))}, "
-            "expected for "
-            f"{requested_assignment.id}, "
-            "or for one assignment alone."
+            f"{folder.name}: has submissions for {', '.join(map(sanitise_name, list(assignment_ids)[:5]))}, expected "
+            f"for {requested_assignment.id}, or for one assignment alone."
         )
     return [each for each in downloads if each.assignment == requested_assignment.id]
 

@@ -92,8 +92,7 @@ class People:
                 return numbered_student
             raise UsageError(
                 f"{self.file} has {sanitise_name(numbered_student.name)} as Participant {number}, not "
-                f"{sanitise_name(stated_student.name)}; expected "
-                "the table of this assignment."
+                f"{sanitise_name(stated_student.name)}; expected the table of this assignment."
             )
         # With group submissions, Moodle puts the group before the name: Group 1-Ada.
         for key in (*full_names, *(key.partition("-")[2] for key in full_names)):
@@ -103,8 +102,7 @@ class People:
             if candidates:
                 raise UsageError(
                     f"{len(candidates)} people in {self.file} are called {sanitise_name(full_names.get(key, key))}, "
-                    "expected a table "
-                    "that distinguishes them by the Identifier of Moodle's worksheet, or by id."
+                    "expected a table that distinguishes them by the Identifier of Moodle's worksheet, or by id."
                 )
         name = stated_student.name or stated_student.id
         hint = suggest_name(name, {each.name or each.id for several in self.by_name.values() for each in several})
@@ -167,10 +165,8 @@ def _read_students(rows: Sequence[CsvRow], file: str) -> Iterator[tuple[CsvRow, 
             raise UsageError(f"{file}: line {row.line} has no id, name or e-mail address, expected one of them.")
         if len(lines[_normalise_key(student_id)]) > 1:
             raise UsageError(
-                f"{file}: lines {' and '.join(lines[_normalise_key(student_id)][:5])}: "
-                f"{sanitise_name(student_id)} is the id of "
-                "several students, "
-                "expected a different id for each."
+                f"{file}: lines {' and '.join(lines[_normalise_key(student_id)][:5])}: {sanitise_name(student_id)} is "
+                "the id of several students, expected a different id for each."
             )
         yield row, Student(student_id, name, email)
 

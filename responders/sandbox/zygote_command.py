@@ -17,12 +17,11 @@ from sim.processes import build_arithmetic_environment, build_python_command
 _FIXED_ADDRESS_COMMAND = (
     sys.executable,
     *("-I", "-S", "-c"),
-    "import ctypes, os, sys; libc = ctypes.CDLL(None); "
-    "PR_SET_SECUREBITS, NOROOT_LOCKED, PR_CAP_AMBIENT, IS_SET, LOWER, CAP_SETPCAP = 28, 3, 47, 1, 3, 8; "
-    "in_bubblewrap = libc.prctl(PR_CAP_AMBIENT, IS_SET, CAP_SETPCAP, 0, 0) == 1; "
-    "in_bubblewrap and libc.prctl(PR_SET_SECUREBITS, NOROOT_LOCKED, 0, 0, 0); "
-    "in_bubblewrap and libc.prctl(PR_CAP_AMBIENT, LOWER, CAP_SETPCAP, 0, 0); "
-    "libc.personality(0x40000); os.execv(sys.argv[1], sys.argv[1:])",
+    "import ctypes, os, sys; libc = ctypes.CDLL(None); PR_SET_SECUREBITS, NOROOT_LOCKED, PR_CAP_AMBIENT, IS_SET, "
+    "LOWER, CAP_SETPCAP = 28, 3, 47, 1, 3, 8; in_bubblewrap = libc.prctl(PR_CAP_AMBIENT, IS_SET, CAP_SETPCAP, 0, 0) "
+    "== 1; in_bubblewrap and libc.prctl(PR_SET_SECUREBITS, NOROOT_LOCKED, 0, 0, 0); in_bubblewrap and "
+    "libc.prctl(PR_CAP_AMBIENT, LOWER, CAP_SETPCAP, 0, 0); libc.personality(0x40000); os.execv(sys.argv[1], "
+    "sys.argv[1:])",
 )
 _START_CODE = (
     f"import os, sys; os.sched_setaffinity(0, {sorted(ALLOWED)}); "

@@ -205,8 +205,7 @@ def _show_recording(recording: Recording) -> None:
         end, owner = robot_recording.end, "" if robot_recording is recording else f"{robot}: "
         print_line(
             f"{robot_recording.end_t:8.2f} s  {owner}end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading "
-            f"{end.heading:.1f} degrees; "
-            f"{robot_recording.verdict}"
+            f"{end.heading:.1f} degrees; {robot_recording.verdict}"
         )
     for fault in collect_faults(recording):
         owner = "" if fault.file else f" of the {fault.who}"

@@ -45,10 +45,7 @@ def add(
     for other_course, instructor in added.elsewhere:
         print_note(
             f"{_format_member(instructor)} is also an instructor of {other_course}. If this is the same person: "
-            "robomark "
-            "user join "
-            f"{member.id} "
-            f"--course {course} --same-as {instructor.id} --of {other_course}"
+            f"robomark user join {member.id} --course {course} --same-as {instructor.id} --of {other_course}"
         )
 
 

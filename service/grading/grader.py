@@ -174,9 +174,8 @@ def _build_spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     visible_notes = [result.recording.notes for result in results if result.visibility == "visible"]
     counts = [(note, sum(note in notes for notes in visible_notes)) for note in REPLAY_NOTES.values()]
     return tuple(
-        f"{note.replace('this trial', f'{count} of {len(visible_notes)} trials')}: two trials had ended with the "
-        "same fault, "
-        "and the program had the same input and uses no random numbers, so the result would be the same"
+        f"{note.replace('this trial', f'{count} of {len(visible_notes)} trials')}: two trials had ended with the same "
+        "fault, and the program had the same input and uses no random numbers, so the result would be the same"
         for note, count in counts
         if count
     )

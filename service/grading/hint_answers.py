@@ -90,8 +90,7 @@ def hint_about_none_answers(clues: Clues) -> Iterator[str]:
     if condition is not None:
         yield (
             f"{listing.locate(statement.line)} returns None, and the answer was {quote_text(answer)}. Check the "
-            "condition in line "
-            f"{condition.line}: {join_tokens(condition.condition)}"
+            f"condition in line {condition.line}: {join_tokens(condition.condition)}"
         )
 
 
@@ -157,9 +156,8 @@ def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
             location = _describe_key_line([key], clues)
             if location:
                 yield (
-                    f"{location}: {quote_text(key)} is {values[key]}; expected {number}, which "
-                    f"{quote_text(other_key)} has. "
-                    f"Check the values of {quote_text(key)} and {quote_text(other_key)}: they may be swapped"
+                    f"{location}: {quote_text(key)} is {values[key]}; expected {number}, which {quote_text(other_key)} "
+                    f"has. Check the values of {quote_text(key)} and {quote_text(other_key)}: they may be swapped"
                 )
                 return
 
@@ -178,9 +176,8 @@ def hint_about_text_numbers(clues: Clues) -> Iterator[str]:
         if listing is not None:
             yield (
                 f"{_describe_key_line([key], clues) or 'responder.py'} sends {quote_text(key)} as the text "
-                f"{quote_text(match[2])}, "
-                f"and {listing.locate(listing.find_line(pattern))} compares it with a number. Write int(...) around "
-                "the text"
+                f"{quote_text(match[2])}, and {listing.locate(listing.find_line(pattern))} compares it with a number. "
+                "Write int(...) around the text"
             )
             return
 

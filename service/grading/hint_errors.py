@@ -256,9 +256,8 @@ def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, stateme
         assignment = next((each for each in listing.code.statements if each.target == call.name), None)
         if assignment is not None:
             return (
-                f"Line {assignment.line} gives {call.name} another value: {join_tokens(assignment.tokens)}. "
-                "Choose another name "
-                "there."
+                f"Line {assignment.line} gives {call.name} another value: {join_tokens(assignment.tokens)}. Choose "
+                "another name there."
             )
     return "A sign such as * or a comma is missing before the bracket, or the name stands for a value."
 

@@ -84,8 +84,7 @@ def hint_about_unentered_loop(clues: Clues) -> Iterator[str]:
         if acting_statements and not any(one.line in executed_lines for one in body):
             yield (
                 f"{listing.locate(statement.line)}: the loop never ran, because {join_tokens(statement.condition)} was "
-                "false from the "
-                "start. Check the sign of the comparison and the values in it"
+                "false from the start. Check the sign of the comparison and the values in it"
             )
             return
 
@@ -188,23 +187,20 @@ def _hint_about_resending(failure: _Failure) -> str:
     loop = next((each for each in failure.listing.code.list_enclosing_loops(statement) if each is not statement), None)
     if "after its answer had come" in failure.found and loop is not None:
         return (
-            f"{failure.listing.locate(statement.line)} sends the message again although its answer had come. Leave "
-            "the loop "
-            f"in line {loop.line} as soon as the answer is there, for example with break below if messages:"
+            f"{failure.listing.locate(statement.line)} sends the message again although its answer had come. Leave the "
+            f"loop in line {loop.line} as soon as the answer is there, for example with break below if messages:"
         )
     if "no answer came" not in failure.found:
         return ""
     if loop is None:
         return (
-            f"{failure.listing.locate(statement.line)} sends the message once: {failure.message_clause}. Repeat "
-            "it in a "
-            "while loop"
+            f"{failure.listing.locate(statement.line)} sends the message once: {failure.message_clause}. Repeat it in "
+            "a while loop"
         )
     loop_head = join_tokens(loop.condition) if loop.keyword == "while" else join_tokens(loop.tokens[1:]).rstrip(":")
     return (
-        f"{failure.listing.locate(loop.line)}: the loop ended, or went on to the next message, before an answer "
-        "had come. "
-        f"Check {loop_head}: it must send the message again until the answer is there"
+        f"{failure.listing.locate(loop.line)}: the loop ended, or went on to the next message, before an answer had "
+        f"come. Check {loop_head}: it must send the message again until the answer is there"
     )
 
 
@@ -223,8 +219,7 @@ def _hint_about_other_sensor(failure: _Failure) -> str:
         return ""
     return (
         f"{failure.listing.locate(statement.line)} reads {other_property}, but {required_property} is judged: "
-        f"{failure.message_clause}. Write "
-        f"{required_property}"
+        f"{failure.message_clause}. Write {required_property}"
     )
 
 
@@ -260,9 +255,8 @@ def _hint_about_loop_end(failure: _Failure) -> str:
             else ""
         )
         return (
-            f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop did not end, because "
-            f"{condition} stayed true."
-            f"{condition_advice or ' Choose a condition that becomes false in the right place'}"
+            f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop did not end, because {condition} "
+            f"stayed true.{condition_advice or ' Choose a condition that becomes false in the right place'}"
         )
     end_clause = "" if any(each.keyword == "break" for each in body) else f" as soon as {condition} is false"
     reading_sentence = f" The sensor read {last_reading}" if last_reading else ""

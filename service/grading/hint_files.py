@@ -159,8 +159,7 @@ def _hint_about_redefinitions(process: list[Listing]) -> Iterator[str]:
                     )
                     yield (
                         f"{listing.locate(statement.line)} defines {name} again, in place of the function in "
-                        f"{location}. "
-                        "Delete one of the two, or give it another name"
+                        f"{location}. Delete one of the two, or give it another name"
                     )
                     return
                 definitions[name] = listing, statement

@@ -99,8 +99,7 @@ def hint_about_messages(clues: Clues) -> Iterator[str]:
             location = clues.describe_matching_line("program", re.compile(r"""["'](?:PY::|IMG_DATA)"""))
             yield (
                 f"{location} prints {quote_text(text)}, which is not sent as a message; expected "
-                f"{quote_text(late_match[1])} at the "
-                "start of the text. Print the other words with a print of their own"
+                f"{quote_text(late_match[1])} at the start of the text. Print the other words with a print of their own"
             )
             return
         prefix_match = _NEARLY_PY.match(text)

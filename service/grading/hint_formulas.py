@@ -47,8 +47,7 @@ def hint_about_gain(clues: Clues) -> Iterator[str]:
                 sign = "below" if factor * maximum <= offset else "above"
                 yield (
                     f"{listing.locate(statement.line)}: {join_tokens(tokens[index - 2 : index + 3])} multiplies first, "
-                    "so it is "
-                    f"{sign} 0 for each reading. Write {gain} * ({light} - {edge})"
+                    f"so it is {sign} 0 for each reading. Write {gain} * ({light} - {edge})"
                 )
                 return
 
@@ -93,9 +92,8 @@ def hint_about_radius(clues: Clues) -> Iterator[str]:
             if pi_index is not None and statement.tokens[pi_index + 1] == "*":
                 yield (
                     f"{listing.locate(statement.line)}: the result {reported_numbers[0]} is half of "
-                    f"{required_match[1]}. A wheel's "
-                    "circumference is "
-                    f"pi times the diameter. If {statement.tokens[pi_index + 2]} is the radius, multiply it by 2"
+                    f"{required_match[1]}. A wheel's circumference is pi times the diameter. If "
+                    f"{statement.tokens[pi_index + 2]} is the radius, multiply it by 2"
                 )
                 return
 
@@ -112,9 +110,8 @@ def hint_about_reversed_distance(clues: Clues) -> Iterator[str]:
             if reading:
                 number = statement.tokens[index - 1]
                 yield (
-                    f"{listing.locate(statement.line)}: {number} - {reading} is below 0 when the distance is "
-                    "larger, so the "
-                    f"robot drives backwards. Write {reading} - {number}"
+                    f"{listing.locate(statement.line)}: {number} - {reading} is below 0 when the distance is larger, "
+                    f"so the robot drives backwards. Write {reading} - {number}"
                 )
                 return
 
@@ -140,10 +137,9 @@ def hint_about_gyro_direction(clues: Clues) -> Iterator[str]:
                 if (turn_angle < 0) == sign.startswith("<"):
                     verb, side = ("falls", "left") if turn_angle < 0 else ("grows", "right")
                     yield (
-                        f"{listing.locate(loop.line)}: the gyro {verb} when the robot turns {side}, so the loop "
-                        "never ends: "
-                        f"{join_tokens(loop.condition)} stays true. Write {_swap_operands(left_operand)} in place of "
-                        f"{join_tokens(left_operand)}"
+                        f"{listing.locate(loop.line)}: the gyro {verb} when the robot turns {side}, so the loop never "
+                        f"ends: {join_tokens(loop.condition)} stays true. Write {_swap_operands(left_operand)} in "
+                        f"place of {join_tokens(left_operand)}"
                     )
                     return
 

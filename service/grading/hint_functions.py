@@ -49,8 +49,7 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
             fix = advice or "Work this call out by hand, line by line, and compare"
             yield (
                 f"{listing.locate(statement.line)}, {join_tokens(statement.tokens)}: "
-                f"{message[0].lower()}{message[1:].rstrip('.')}. "
-                f"{fix}"
+                f"{message[0].lower()}{message[1:].rstrip('.')}. {fix}"
             )
             return
 
@@ -66,9 +65,8 @@ def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
                 if statement.keyword == "except" and len(statement.tokens) > 2 and not statement.has_token("Exception"):
                     yield (
                         f"{listing.locate(statement.line)} catches only "
-                        f"{join_tokens(statement.tokens[1:]).rstrip(':')}. "
-                        "Another error, "
-                        "such as KeyError or TypeError, ends the function. Write except Exception:"
+                        f"{join_tokens(statement.tokens[1:]).rstrip(':')}. Another error, such as KeyError or "
+                        "TypeError, ends the function. Write except Exception:"
                     )
                     return
 
@@ -203,15 +201,13 @@ def _hint_about_function(name: str, message: str, clues: Clues) -> str:
     if early_return is not None:
         return (
             f"{listing.locate(early_return.line)}: return is in the loop, so {name} ends in the first pass of the "
-            "loop. Move "
-            "return below the loop: indent it less"
+            "loop. Move return below the loop: indent it less"
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
     lists = _LISTS.search(message)
     if stop is not None and lists and len(lists[2].split(",")) < len(lists[1].split(",")) + (lists[2] == "[]"):
         return (
-            f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip "
-            "only this "
-            "value, write continue in place of break"
+            f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only "
+            "this value, write continue in place of break"
         )
     return ""

@@ -42,10 +42,8 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
         if end is not None and pass_counts and not is_used and any(pass_counts <= numbers for numbers in number_sets):
             end_code = join_tokens(call.arguments[1])
             yield (
-                f"{listing.locate(statement.line)}: range(1, {end_code}) counts from 1 to {end - 1:g}, so the "
-                "loop runs "
-                f"{end - 1:g} "
-                f"times. To run {end:g} times, write range({end_code})"
+                f"{listing.locate(statement.line)}: range(1, {end_code}) counts from 1 to {end - 1:g}, so the loop "
+                f"runs {end - 1:g} times. To run {end:g} times, write range({end_code})"
             )
             return
 
@@ -75,8 +73,7 @@ def hint_about_range_step(clues: Clues) -> Iterator[str]:
             range_call = f"range({format_arguments(call.arguments)})"
             yield (
                 f"{listing.locate(statement.line)}: {range_call} counts in steps of {step:g}, so {actual} comes after "
-                f"{last_number}, and "
-                f"not {expected}. The third number is the step: write range({', '.join(arguments)})"
+                f"{last_number}, and not {expected}. The third number is the step: write range({', '.join(arguments)})"
             )
             return
 
@@ -128,8 +125,7 @@ def hint_about_spoken_name(clues: Clues) -> Iterator[str]:
                 arguments = format_arguments((("str", "(", name, ")"), *call.arguments[1:]))
                 yield (
                     f"{listing.locate(statement.line)} {call.name}s the word {text} and not the value of {name}, "
-                    "because it is "
-                    f"in quotes. Write {call.name}({arguments})"
+                    f"because it is in quotes. Write {call.name}({arguments})"
                 )
                 return
 
@@ -155,10 +151,8 @@ def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
                     call = next(one for one in drive_statement.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
                     amount = join_tokens(call.arguments[-1]) if call.arguments else "the number"
                     yield (
-                        f"{listing.locate(drive_statement.line)}: {name} never uses its parameter {parameter}, so "
-                        "it does "
-                        "the same "
-                        f"with each value. Write {parameter} in place of {amount} if that is meant"
+                        f"{listing.locate(drive_statement.line)}: {name} never uses its parameter {parameter}, so it "
+                        f"does the same with each value. Write {parameter} in place of {amount} if that is meant"
                     )
                     return
 
@@ -174,8 +168,7 @@ def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
         listing, statement = moves[-1]
         yield (
             f"{listing.locate(statement.line)} drives forwards like the lines before it, so the robot never comes "
-            "back. "
-            "Write - before both speeds to drive backwards"
+            "back. Write - before both speeds to drive backwards"
         )
 
 
@@ -197,8 +190,7 @@ def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:
                 side = "left" if target[1] > 0 else "right"
                 yield (
                     f"{listing.locate(statement.line)} turns the robot to the wrong side: it ends as far from its way "
-                    "as the "
-                    f"target, but on the other side. Turn {side} there"
+                    f"as the target, but on the other side. Turn {side} there"
                 )
                 return
 

@@ -67,8 +67,7 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
         )
     return (
         f'{listing.locate(statement.line)}: the {part_name} was still in the line "{join_tokens(statement.tokens)}" '
-        f"when {stop_event}. "
-        "Check what it waits for, and whether that ever happens"
+        f"when {stop_event}. Check what it waits for, and whether that ever happens"
     )
 
 
@@ -310,8 +309,7 @@ def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeS
         if assignment is not None:
             return (
                 f"{name} is read once, in line {assignment.line}, and not again. Repeat "
-                f"{join_tokens(assignment.tokens)} in the "
-                "loop"
+                f"{join_tokens(assignment.tokens)} in the loop"
             )
     return f"{name_list} {verb} in the loop. Assign {names[0]} in the loop"
 

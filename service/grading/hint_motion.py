@@ -49,16 +49,14 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
         listing, statement = unwaited_moves[0]
         yield (
             f"{listing.locate(statement.line)}: with block=False the program does not wait, and it ends before the "
-            "robot moves. "
-            "Remove block=False"
+            "robot moves. Remove block=False"
         )
     elif started_moves and _list_enclosing_conditions(*started_moves[0]):
         listing, statement = started_moves[0]
         head = _list_enclosing_conditions(listing, statement)[0]
         yield (
             f"{listing.locate(head.line)}: the robot never moved. Line {statement.line} runs only if "
-            f"{join_tokens(head.condition)} "
-            "is true. Print the values in it, and check the condition"
+            f"{join_tokens(head.condition)} is true. Print the values in it, and check the condition"
         )
     elif started_moves:
         listing, statement = started_moves[0]
@@ -74,18 +72,15 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
             f"line {stop_statement.line} switches them off at once" if stop_statement else "the program ends at once"
         )
         yield (
-            f"{listing.locate(statement.line)} switches the motors on, but nothing waits after it: {consequence}, "
-            "and the "
-            "robot never "
-            "moved. Add time.sleep(2), with import time above, or use on_for_seconds"
+            f"{listing.locate(statement.line)} switches the motors on, but nothing waits after it: {consequence}, and "
+            "the robot never moved. Add time.sleep(2), with import time above, or use on_for_seconds"
         )
     elif moves and all(_list_enclosing_conditions(*pair) for pair in moves):
         listing, statement = moves[0]
         head = _list_enclosing_conditions(listing, statement)[0]
         yield (
             f"{listing.locate(statement.line)} moves the robot, but the program never came to it: the robot never "
-            "moved. "
-            f"Check the condition in line {head.line}: {join_tokens(head.condition)}"
+            f"moved. Check the condition in line {head.line}: {join_tokens(head.condition)}"
         )
     elif moves or not any(listing.code.statements for listing in clues.programs):
         return
@@ -140,9 +135,8 @@ def hint_about_distances(clues: Clues) -> Iterator[str]:
             else ""
         )
         yield (
-            f"{listing.locate(statement.line)} compares distance_centimeters with {number:g}: that is in "
-            "centimetres, so "
-            f"{10 * number:g} mm. For {number:g} mm write "
+            f"{listing.locate(statement.line)} compares distance_centimeters with {number:g}: that is in centimetres, "
+            f"so {10 * number:g} mm. For {number:g} mm write "
             f"{number / 10:g}{'. ' if failure_message else ''}{failure_message.rstrip('.')}"
         )
 
@@ -208,10 +202,8 @@ def hint_about_speeds(clues: Clues) -> Iterator[str]:
                 return
             if left_speed != right_speed:
                 yield (
-                    f"{listing.locate(statement.line)} gives the wheels the speeds {left_speed:g} and "
-                    f"{right_speed:g}, so the "
-                    "robot drives "
-                    "a curve. To drive straight on, give both the same speed"
+                    f"{listing.locate(statement.line)} gives the wheels the speeds {left_speed:g} and {right_speed:g}, "
+                    "so the robot drives a curve. To drive straight on, give both the same speed"
                 )
                 return
 

@@ -80,9 +80,8 @@ def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None,
     if definition.keyword in ("import", "from"):
         process_name = "the robot program" if not is_robot else "the responder"
         return (
-            f"The import in {defining_listing.name} is only for {process_name}. Add "
-            f"{join_tokens(definition.tokens)} at the top of "
-            f"{listing.name}."
+            f"The import in {defining_listing.name} is only for {process_name}. Add {join_tokens(definition.tokens)} "
+            f"at the top of {listing.name}."
         )
     explanation = "a robot program does not see it" if is_robot else "the responder does not see it"
     position = ", below its first line" if listing.part is None and is_robot else ""

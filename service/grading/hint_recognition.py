@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from service.grading.grade import Accuracy, CriterionResult
 from service.grading.hint_clues import Clues
@@ -65,7 +65,7 @@ def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
     wrong_truths = [truth for truth, answer in answers.items() if truth != answer]
     if not wrong_truths or len(set(answers.values())) < len(answers):
         return ""
-    location = _describe_labels_line(answers, clues)
+    location = _describe_labels_line(wrong_truths, clues)
     if len(swapped_pairs) == len(wrong_truths) == 2:
         first_name, second_name = swapped_pairs[0]
         order = "Put the names into the order of the network" if _has_prediction(clues) else "Exchange the two names"
@@ -73,25 +73,22 @@ def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
     if len(wrong_truths) == len(answers) > 2:
         return (
             f"{location}: every image gets another's name, so the names are shifted by one place or in another order: "
-            f"{quote_text(wrong_truths[0])} is called {quote_text(answers[wrong_truths[0]])}. Put the names into "
-            "the order of the "
-            "network, and "
-            "count from 0"
+            f"{quote_text(wrong_truths[0])} is called {quote_text(answers[wrong_truths[0]])}. Put the names into the "
+            "order of the network, and count from 0"
         )
     if len(wrong_truths) > 2:
         return (
             f"{location}: the names are in another order: {quote_text(wrong_truths[0])} is called "
-            f"{quote_text(answers[wrong_truths[0]])}. "
-            "Put the names into the order of the network"
+            f"{quote_text(answers[wrong_truths[0]])}. Put the names into the order of the network"
         )
     return ""
 
 
-def _describe_labels_line(answers: Mapping[str, str], clues: Clues) -> str:
+def _describe_labels_line(names: Sequence[str], clues: Clues) -> str:
     """Return the first line with one of the names in quotes."""
     for listing in clues.responders:
         for number, line in enumerate(listing.lines, 1):
-            if any(f'"{name}"' in line or f"'{name}'" in line for name in answers):
+            if any(f'"{name}"' in line or f"'{name}'" in line for name in names):
                 return listing.locate(number)
     return _describe_prediction_line(clues)
 
@@ -131,9 +128,7 @@ def _hint_about_frequent_answer(accuracy: Accuracy, clues: Clues) -> str:
                 )
                 return (
                     f"{listing.locate(statement.line)}: most images are called {quote_text(name)}. Check "
-                    f"{checked_part}, and "
-                    "the pixels "
-                    "that it gets: black is near 0, white near 255"
+                    f"{checked_part}, and the pixels that it gets: black is near 0, white near 255"
                 )
         fit_statement = next(
             (each for each in listing.code.statements if any(_is_fit_call(call) for call in each.calls)), None
@@ -141,8 +136,7 @@ def _hint_about_frequent_answer(accuracy: Accuracy, clues: Clues) -> str:
         if fit_statement is not None:
             return (
                 f"{listing.locate(fit_statement.line)} trains a classifier that names most images wrongly, often as "
-                f"{quote_text(name)}. "
-                "Train longer (max_iter=300), and give each image the label that belongs to it"
+                f"{quote_text(name)}. Train longer (max_iter=300), and give each image the label that belongs to it"
             )
     return ""
 

@@ -43,8 +43,7 @@ def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
             if is_single and count > 1 and len(call.arguments[0]) == 1:
                 yield (
                     f"{listing.locate(statement.line)} {call.name}s {quote_text(text)} {count} times, in each pass of "
-                    "the loop in "
-                    f"line {loop.line}; expected once. To run it after the loop, remove its indentation"
+                    f"the loop in line {loop.line}; expected once. To run it after the loop, remove its indentation"
                 )
                 return
 
@@ -65,10 +64,8 @@ def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
         ):
             yield (
                 f"{listing.locate(statement.line)}: this loop is inside the loop in line {outer_loop.line}, so it "
-                "repeats "
-                "its words "
-                f"in each pass of that loop. Words that are expected once appeared {match[1]} more times. To run this "
-                "loop once, after the other loop, indent it less"
+                f"repeats its words in each pass of that loop. Words that are expected once appeared {match[1]} more "
+                "times. To run this loop once, after the other loop, indent it less"
             )
             return
 
@@ -113,8 +110,7 @@ def hint_about_last_number(clues: Clues) -> Iterator[str]:
             )
             yield (
                 f"{listing.locate(statement.line)}: range({format_arguments(call.arguments)}) ends before "
-                f"{missing_number}. "
-                f"Write range({format_arguments(fixed_arguments)})"
+                f"{missing_number}. Write range({format_arguments(fixed_arguments)})"
             )
             return
 
@@ -135,11 +131,9 @@ def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
             and listing.code.number(condition[condition.index("==") + 1 :]) is not None
         ):
             yield (
-                f"{listing.locate(statement.line)}: the loop goes on only while {join_tokens(condition)} is true, "
-                "so it "
-                "ends at the "
-                f"first other reading: the program ended after {clues.seconds:.1f} s. Write a condition that is true "
-                "until the last reading that is asked for"
+                f"{listing.locate(statement.line)}: the loop goes on only while {join_tokens(condition)} is true, so "
+                f"it ends at the first other reading: the program ended after {clues.seconds:.1f} s. Write a condition "
+                "that is true until the last reading that is asked for"
             )
             return
 
@@ -165,9 +159,8 @@ def hint_about_single_reaction(clues: Clues) -> Iterator[str]:
         if reactions:
             yield (
                 f"{listing.locate(_find_first_move(listing.code.statements, statement).line)}: the program does "
-                "everything once, and "
-                f"ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write while True: above this "
-                f"line, and indent the lines from here to line {reactions[-1].last_line}"
+                f"everything once, and ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write "
+                f"while True: above this line, and indent the lines from here to line {reactions[-1].last_line}"
             )
             return
 

@@ -62,9 +62,8 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
         for head in listing.code.list_functions():
             if _RESPONDER.match(head.tokens[1]) and listing.part is None:
                 yield (
-                    f"{listing.locate(head.line)} defines {head.tokens[1]} in the robot program, where nothing "
-                    "calls it. "
-                    f"Move it to a cell above, and add roboSim.pyresponder = {head.tokens[1]} below it"
+                    f"{listing.locate(head.line)} defines {head.tokens[1]} in the robot program, where nothing calls "
+                    f"it. Move it to a cell above, and add roboSim.pyresponder = {head.tokens[1]} below it"
                 )
                 return
     functions = [
@@ -87,8 +86,7 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
         else:
             yield (
                 f"{listing.locate(head.line)} defines {sanitise_name(name)}, but there is no function called "
-                "responder. "
-                "Begin the function that answers the robot with def responder(text):"
+                "responder. Begin the function that answers the robot with def responder(text):"
             )
         return
     location = next((each.name for each in clues.responders if each.part is not None), "no cell")
@@ -110,10 +108,8 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
                 if is_function and ":" in statement.tokens:
                     count = _describe_parameters(statement)
                     yield (
-                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} asks for "
-                        f"{count}, but it "
-                        "is called with "
-                        f"one text. Write def {statement.tokens[1]}(text):"
+                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} asks for {count}, "
+                        f"but it is called with one text. Write def {statement.tokens[1]}(text):"
                     )
                     return
                 if not call_match and statement.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
@@ -141,8 +137,7 @@ def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
                 code_line = quote_text(listing.lines[line - 1])
                 yield (
                     f"{listing.locate(line)}, {code_line}, prints the answer, but no line returns it. Return the "
-                    "answer with "
-                    "return"
+                    "answer with return"
                 )
             elif not returns:
                 yield f"{listing.locate(head.line)}: {head.tokens[1]} has no return with an answer; expected one"
@@ -192,9 +187,8 @@ def hint_about_double_json(clues: Clues) -> Iterator[str]:
         ]
         for statement in (*double_dumps, *dump_statements[-1:]):
             yield (
-                f"{listing.locate(statement.line)}: the object is made JSON twice, so the robot gets a text and "
-                "no object. "
-                "Call json.dumps once"
+                f"{listing.locate(statement.line)}: the object is made JSON twice, so the robot gets a text and no "
+                "object. Call json.dumps once"
             )
             return
 
@@ -214,8 +208,7 @@ def hint_about_single_colon(clues: Clues) -> Iterator[str]:
                     split_call = 'partition("::")' if method == "partition" else 'split("::", 1)'
                     yield (
                         f'{listing.locate(statement.line)} cuts the message at ":", so the rest still begins with '
-                        "a colon. "
-                        f"The prefix ends in two colons: write {split_call}"
+                        f"a colon. The prefix ends in two colons: write {split_call}"
                     )
                     return
 

@@ -42,8 +42,7 @@ def hint_about_signatures(clues: Clues) -> Iterator[str]:
         if location and fault.line is not None and enclosing_class is None:
             yield (
                 f"{location} calls {name} with another number of values than line {head.line} of {listing.name} "
-                "defines. "
-                f"Its parameters are: {', '.join(_list_parameters(head)) or 'none'}"
+                f"defines. Its parameters are: {', '.join(_list_parameters(head)) or 'none'}"
             )
             return
 

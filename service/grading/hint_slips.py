@@ -86,8 +86,7 @@ def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
         if len(comparisons) > 1:
             return (
                 f"{listing.locate(statement.line)}: {token} is calculated before {comparisons[0]}, so this does not "
-                "ask for "
-                f"both comparisons. Write {keywords[token]} in place of {token}"
+                f"ask for both comparisons. Write {keywords[token]} in place of {token}"
             )
     return ""
 
@@ -132,10 +131,9 @@ def _check_bare_operand(listing: Listing, statement: Statement) -> str:
         ):
             number = tokens[index + 4]
             return (
-                f"{listing.locate(statement.line)}: {first_name} {connective} {second_name} {sign} {number} only "
-                "asks whether "
-                f"{first_name} is not "
-                f"0. Write {first_name} {sign} {number} {connective} {second_name} {sign} {number}"
+                f"{listing.locate(statement.line)}: {first_name} {connective} {second_name} {sign} {number} only asks "
+                f"whether {first_name} is not 0. Write {first_name} {sign} {number} {connective} {second_name} {sign} "
+                f"{number}"
             )
     return ""
 
@@ -275,8 +273,7 @@ def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
         return ""
     return (
         f"{listing.locate(next_statement.line)}: this if is also checked when the if in line {statement.line} was "
-        "true, so both "
-        "run. Write elif in place of if"
+        "true, so both run. Write elif in place of if"
     )
 
 

@@ -79,9 +79,8 @@ def hint_about_uncalled_function(clues: Clues) -> Iterator[str]:
             }
             if name not in used_names and effects and not effects & achieved_effects:
                 yield (
-                    f"{listing.locate(head.line)} defines {name}, but it is never called. Write "
-                    f"{_format_call(head)} below "
-                    "the function, at the start of a line"
+                    f"{listing.locate(head.line)} defines {name}, but it is never called. Write {_format_call(head)} "
+                    "below the function, at the start of a line"
                 )
                 return
 
@@ -124,8 +123,7 @@ def hint_about_single_reading(clues: Clues) -> Iterator[str]:
             text = join_tokens(statement.tokens[1:])
             yield (
                 f"{listing.locate(statement.line)} reads the sensor only once, because if does not repeat. To repeat "
-                "as long as "
-                f"this is true, write while {text}"
+                f"as long as this is true, write while {text}"
             )
             return
 
@@ -144,8 +142,7 @@ def hint_about_stop_in_loop(clues: Clues) -> Iterator[str]:
         if any(has_motor_call(one, CONTINUOUS_MOVES) for one in listing.code.statements[: statement.number]):
             yield (
                 f"{listing.locate(stop.line)} switches the motors off in the loop in line {statement.line}, so the "
-                "robot stops "
-                "in the first pass of the loop. Move the line below the loop: remove its indentation"
+                "robot stops in the first pass of the loop. Move the line below the loop: remove its indentation"
             )
             return
 
@@ -172,8 +169,7 @@ def hint_about_unindented_statement(clues: Clues) -> Iterator[str]:
         if is_variable_used or is_move_repeated:
             yield (
                 f"{listing.locate(following.line)} is outside the loop of line {statement.line}, so it runs only once, "
-                "after it. "
-                "If it belongs to the loop, indent it like the lines above"
+                "after it. If it belongs to the loop, indent it like the lines above"
             )
             return
 

@@ -116,8 +116,7 @@ def _explain_missed_zone(sign: str, number: float, readings_before: Floats, zone
     minimum, maximum = sorted((float(zone_extreme), float(earlier_extreme)))
     return (
         f"the loop goes on, because the sensor reads {zone_extreme:.1f} where the robot should stop, and "
-        f"{zone_extreme:.1f} {sign} "
-        f"{number:g} is true. Choose a number between {minimum:.1f} and {maximum:.1f}"
+        f"{zone_extreme:.1f} {sign} {number:g} is true. Choose a number between {minimum:.1f} and {maximum:.1f}"
     )
 
 

@@ -66,9 +66,8 @@ def hint_about_rare_readings(clues: Clues) -> Iterator[str]:
         if has_reading and statement.parent == loop.number:
             distance = _measure_top_speed(clues) * number
             yield (
-                f"{listing.locate(statement.line)}: the loop reads the sensor only every {number:g} s, and the "
-                "robot drives "
-                f"about {distance:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
+                f"{listing.locate(statement.line)}: the loop reads the sensor only every {number:g} s, and the robot "
+                f"drives about {distance:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
             )
             return
 

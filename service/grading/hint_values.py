@@ -66,8 +66,7 @@ def hint_about_swapped_ports(clues: Clues) -> Iterator[str]:
         lines_sentence = f" Line {other_lines[0]} has the same." if other_lines else ""
         yield (
             f"{listing.locate(statement.line)} takes OUTPUT_C for the left motor, so the robot turns to the other "
-            "side: the "
-            f"left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{lines_sentence}"
+            f"side: the left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{lines_sentence}"
         )
 
 
@@ -114,10 +113,8 @@ def hint_about_few_samples(clues: Clues) -> Iterator[str]:
         if len(sleeping_loops) == 1:
             listing, statement, seconds = sleeping_loops[0]
             yield (
-                f"{listing.locate(statement.line)}: {sentence}. The loop waits {seconds:g} s after each of them: "
-                "wait less, "
-                "and let "
-                "the loop repeat more often"
+                f"{listing.locate(statement.line)}: {sentence}. The loop waits {seconds:g} s after each of them: wait "
+                "less, and let the loop repeat more often"
             )
             return
 
@@ -153,8 +150,7 @@ def hint_about_few_images(clues: Clues) -> Iterator[str]:
         listing, statement = drive_statements[0]
         yield (
             f"{listing.locate(statement.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
-            f"{match[1]} "
-            "pairs of images. Drive slower, or take images more often"
+            f"{match[1]} pairs of images. Drive slower, or take images more often"
         )
         return
 
@@ -175,9 +171,8 @@ def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
             listing, statement = loops[0]
             yield (
                 f"{listing.locate(statement.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
-                "it read "
-                f"{match[3]} %, expected {match[1]} to {match[2]} %. Let the robot drive on a little after the loop, "
-                "for example with time.sleep(0.2)"
+                f"it read {match[3]} %, expected {match[1]} to {match[2]} %. Let the robot drive on a little after the "
+                "loop, for example with time.sleep(0.2)"
             )
             return
 
@@ -200,7 +195,6 @@ def hint_about_swapped_atan2(clues: Clues) -> Iterator[str]:
                 y, x = join_tokens(call.arguments[1]), join_tokens(call.arguments[0])
                 yield (
                     f"{listing.locate(statement.line)}: atan2 takes y first, and then x. For the angle from the x axis "
-                    "write "
-                    f"{call.name}({y}, {x})"
+                    f"write {call.name}({y}, {x})"
                 )
                 return

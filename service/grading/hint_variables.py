@@ -25,8 +25,7 @@ def check_name_case(listing: Listing, statement: Statement) -> str:
         return ""
     return (
         f"{listing.locate(statement.line)} assigns {name}, so {intended_name} stays as it is: upper and lower case are "
-        "different. "
-        f"Write {intended_name} = {join_tokens(tokens[2:])}"
+        f"different. Write {intended_name} = {join_tokens(tokens[2:])}"
     )
 
 
@@ -52,8 +51,7 @@ def check_mixed_sides(listing: Listing, statement: Statement) -> str:
     )
     return (
         f"{listing.locate(statement.line)} gives {name} the same value as {twin} in line {twin_assignment.line}: "
-        f"{join_tokens(value)}. "
-        f"Write {name} = {join_tokens(fixed_tokens)}{lines_clause}"
+        f"{join_tokens(value)}. Write {name} = {join_tokens(fixed_tokens)}{lines_clause}"
     )
 
 
@@ -81,9 +79,8 @@ def check_early_step(listing: Listing, statement: Statement) -> str:
     if not is_increment or step.parent != loop.number or step.number >= statement.number:
         return ""
     return (
-        f"{listing.locate(statement.line)}: line {step.line} has already added 1 to {name}, so {items}[{name}] "
-        "skips the "
-        f"first item and goes past the last. Write {items}[{name} - 1]"
+        f"{listing.locate(statement.line)}: line {step.line} has already added 1 to {name}, so {items}[{name}] skips "
+        f"the first item and goes past the last. Write {items}[{name} - 1]"
     )
 
 
@@ -99,8 +96,7 @@ def check_removal_in_loop(listing: Listing, statement: Statement) -> str:
     name, items = loop.tokens[1], loop.tokens[3]
     return (
         f"{listing.locate(statement.line)} removes from {items}, the list that the loop in line {loop.line} goes "
-        "through, "
-        f"so the loop skips the item after it. Append each {name} that is kept to a new list"
+        f"through, so the loop skips the item after it. Append each {name} that is kept to a new list"
     )
 
 
@@ -128,10 +124,9 @@ def check_unreachable_if(listing: Listing, statement: Statement) -> str:
             and all(any(_implies(one, other) for one in conjuncts) for other in earlier_conjuncts)
         ):
             return (
-                f"{listing.locate(statement.line)} is never true: wherever {join_tokens(statement.condition)}, "
-                f"line {earlier_statement.line} "
-                f"has already found that {join_tokens(earlier_statement.condition)}. Move this condition above "
-                f"line {earlier_statement.line}"
+                f"{listing.locate(statement.line)} is never true: wherever {join_tokens(statement.condition)}, line "
+                f"{earlier_statement.line} has already found that {join_tokens(earlier_statement.condition)}. Move "
+                f"this condition above line {earlier_statement.line}"
             )
         in_chain = in_chain and earlier_statement.keyword == "elif"
     return ""

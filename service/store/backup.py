@@ -107,8 +107,7 @@ def _copy_rows(source: Engine, target: Engine) -> None:
             database_url = engine.url.render_as_string(hide_password=True)
             raise HostError(
                 f"The tables of {database_url} are at revision {revision}, this Robomark copies those at "
-                f"{find_newest_revision()}: "
-                "use the release that they are of."
+                f"{find_newest_revision()}: use the release that they are of."
             )
     snapshot_engine = (
         source.execution_options(isolation_level="REPEATABLE READ") if source.dialect.name != "sqlite" else source

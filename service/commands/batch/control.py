@@ -47,9 +47,8 @@ def cancel(batch: BatchId) -> None:
     print_json(batch=stored_batch.id, changed=result.changed, waiting=result.waiting, running=result.running)
     if result.changed:
         print_line(
-            f"batch {stored_batch.id} is cancelled: {result.waiting} queued jobs cancelled, {result.running} "
-            "running jobs "
-            "stopped"
+            f"batch {stored_batch.id} is cancelled: {result.waiting} queued jobs cancelled, {result.running} running "
+            "jobs stopped"
         )
     else:
         print_line(f"batch {stored_batch.id}: nothing changed, all its jobs have ended")

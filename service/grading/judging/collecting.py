@@ -146,10 +146,9 @@ def _build_checks(
     images = "image" if criterion.each == 1 else "images"
     yield (
         bool(classes) and counts[rarest] >= criterion.each,
-        f"Expected at least {criterion.each} different usable {images} of each class, but there are "
-        f"{counts[rarest]} of {quote_text(rarest)}; {usable} of {len(pairs)} pairs are usable, with a pattern "
-        "under the "
-        "left sensor and its label patch under the right one",
+        f"Expected at least {criterion.each} different usable {images} of each class, but there are {counts[rarest]} "
+        f"of {quote_text(rarest)}; {usable} of {len(pairs)} pairs are usable, with a pattern under the left sensor "
+        "and its label patch under the right one",
     )
     if criterion.balance is not None:
         yield (
@@ -160,8 +159,7 @@ def _build_checks(
     yield (
         repeated_count <= criterion.most_duplicates * len(pairs),
         f"Expected at most {criterion.most_duplicates:.0%} of the images to repeat an earlier one, but "
-        f"{repeated_count} of "
-        f"{len(pairs)} do",
+        f"{repeated_count} of {len(pairs)} do",
     )
     useless = len(pairs) - usable
     yield (

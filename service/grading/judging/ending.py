@@ -117,8 +117,7 @@ def _check_since(event: SinceEvent, recording: Recording) -> str:
     if event.moved is not None and not event.moved[0] <= distance <= event.moved[1]:
         return (
             f"Expected the robot to end {event.moved[0]:g} to {event.moved[1]:g} mm from where it was when "
-            f"{event_text}, "
-            f"but it ended {distance:.1f} mm away."
+            f"{event_text}, but it ended {distance:.1f} mm away."
         )
     seconds = recording.end_t - event_time
     if event.seconds is not None and not event.seconds[0] - 1e-9 <= seconds <= event.seconds[1] + 1e-9:

@@ -44,9 +44,7 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     if logged_samples and not values:
         return fail_with(
             f"Expected {name} to be readings of {_describe_instrument(criterion)}, but all {len(logged_samples)} "
-            "samples "
-            "are made up: "
-            "none matches the reading at the time of printing.",
+            "samples are made up: none matches the reading at the time of printing.",
             measures=measures,
         )
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):

@@ -159,8 +159,7 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
             distances = ", ".join(f"{abs(float(forward_distances[each.row])):.0f}" for each in peaks)
             return fail_with(
                 f"Expected the robot to go out {_describe_proportion(criterion.heights)} (within "
-                f"{criterion.tolerance:.0%}), "
-                f"but it went {distances} mm.",
+                f"{criterion.tolerance:.0%}), but it went {distances} mm.",
                 *find_place(recording, turn.row),
                 score=half_score,
                 measures=measures,
@@ -189,9 +188,8 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
             )
     return pass_with(
         f"The robot went out and came back {_format_times(required_count)}, "
-        f"{abs(float(forward_distances[peaks[0].row])):.0f} mm the "
-        "first time, "
-        f"and ended {format_number(float(start_distances[-1]))} mm from its start.",
+        f"{abs(float(forward_distances[peaks[0].row])):.0f} mm the first time, and ended "
+        f"{format_number(float(start_distances[-1]))} mm from its start.",
         recording.end_t,
         recording.end,
         measures,

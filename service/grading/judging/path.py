@@ -115,8 +115,7 @@ def judge_stays_inside(criterion: StaysInside, trial: TrialResult) -> Outcome:
         share = Fraction(row, len(points))
         return fail_with(
             f"Expected {part_name} to stay in {area_text}, but it left it at ({points[row, 0]:.0f}, "
-            f"{points[row, 1]:.0f}) "
-            f"and was up to {np.nanmax(depth):.0f} mm outside.",
+            f"{points[row, 1]:.0f}) and was up to {np.nanmax(depth):.0f} mm outside.",
             *find_place(recording, row),
             score=share,
             measures=measures,

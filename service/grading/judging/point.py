@@ -62,8 +62,7 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
         low, high = criterion.distance
         return fail_with(
             f"Expected the robot's smallest distance to {point} to be {low:g} to {high:g} mm, but it was "
-            f"{min_distance:.0f} "
-            "mm.",
+            f"{min_distance:.0f} mm.",
             *moment,
             measures=measures,
         )
@@ -72,9 +71,8 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
     ):
         requirement = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
         return fail_with(
-            f"Expected the robot to {requirement} {point} than by driving straight on ({straight_distance:.0f} "
-            "mm), but its smallest "
-            f"distance was {min_distance:.0f} mm.",
+            f"Expected the robot to {requirement} {point} than by driving straight on ({straight_distance:.0f} mm), "
+            f"but its smallest distance was {min_distance:.0f} mm.",
             *moment,
             measures=measures,
         )

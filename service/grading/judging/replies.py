@@ -86,8 +86,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     right_count = count - len(wrong_answers)
     return fail_with(
         f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
-        f"{_describe_expected(criterion)}, but {mistake} "
-        f"({right_count} of {count} answered as expected).",
+        f"{_describe_expected(criterion)}, but {mistake} ({right_count} of {count} answered as expected).",
         message.t,
         get_pose_at(recording, message.t),
         Fraction(right_count, count),
@@ -164,9 +163,7 @@ def _judge_order(criterion: Replies, received_messages: list[tuple[int, Message]
         message, expected_answer, mistake = wrong_answers[0]
         return fail_with(
             f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
-            f"{quote_text(expected_answer)}, "
-            f"but {mistake} "
-            f"({right_count} of {count} right).",
+            f"{quote_text(expected_answer)}, but {mistake} ({right_count} of {count} right).",
             message.t,
             get_pose_at(pair.recording, message.t),
             score,

@@ -310,8 +310,7 @@ def _fail_for_stray(
     (x, y), t = mention.place, mention.line.t
     return fail_with(
         f"{_describe_expected(criterion, event)} and not at the place of another text, but it came at ({x:.1f}, "
-        f"{y:.1f}) as "
-        "well.",
+        f"{y:.1f}) as well.",
         t,
         get_pose_at(recording, t),
         Fraction(len(matched_mentions), len(criterion.events)),

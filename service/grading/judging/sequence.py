@@ -65,8 +65,7 @@ def _judge_best_run(
         )
         return fail_with(
             f"Expected the robot to {verb} {expected_text}, but {problem} instead of "
-            f"{_format_alternatives(criterion.words[found_count])} "
-            f"({found_count} of {count} in order).",
+            f"{_format_alternatives(criterion.words[found_count])} ({found_count} of {count} in order).",
             reference_line.t,
             get_pose_at(recording, reference_line.t),
             Fraction(found_count, count),
@@ -84,8 +83,7 @@ def _judge_best_run(
     if hurried_line is not None:
         return fail_with(
             f"Expected the robot to wait until each word is spoken, but it said {quote_text(hurried_line.text)} while "
-            "it was "
-            "still speaking.",
+            "it was still speaking.",
             hurried_line.t,
             get_pose_at(recording, hurried_line.t),
             Fraction(1, 2),

@@ -49,9 +49,8 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
                 measures,
             )
         return fail_with(
-            f"{expected} for {required_share} of the time, but {summary}; at "
-            f"{tick_to_seconds(recording, row):.2f} s they were "
-            f"{distances[row]:.0f} mm apart.",
+            f"{expected} for {required_share} of the time, but {summary}; at {tick_to_seconds(recording, row):.2f} s "
+            f"they were {distances[row]:.0f} mm apart.",
             tick_to_seconds(recording, row),
             get_pose_after(recording, row),
             share,

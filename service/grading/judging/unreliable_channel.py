@@ -79,8 +79,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
     right_count = count - len(mistakes)
     return fail_with(
         f"Expected the robot to send {quote_text(question.text)} again until its answer "
-        f"comes{_describe_bounds(criterion)}, "
-        f"but {mistake} ({right_count} of {count} messages right).",
+        f"comes{_describe_bounds(criterion)}, but {mistake} ({right_count} of {count} messages right).",
         t,
         get_pose_at(recording, t),
         Fraction(right_count, count),
@@ -113,9 +112,8 @@ def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
         )
     if reach_count < criterion.at_least:
         return fail_with(
-            f"Expected the robot to send at least {criterion.at_least} of {_describe_messages(criterion)} in "
-            "reach of the receiver, "
-            f"but it sent {reach_count or 'none'}.",
+            f"Expected the robot to send at least {criterion.at_least} of {_describe_messages(criterion)} in reach of "
+            f"the receiver, but it sent {reach_count or 'none'}.",
             score=Fraction(reach_count, criterion.at_least),
             measures=measures,
         )
@@ -151,8 +149,7 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
         last_question, (line, stale_text) = next(iter(stale_reports.items()))
         return fail_with(
             f"{expected}, but after {quote_text(last_question)} it reported {quote_text(line.text)}, which is the "
-            "answer to "
-            f"{quote_text(stale_text)} {summary}.",
+            f"answer to {quote_text(stale_text)} {summary}.",
             line.t,
             get_pose_at(recording, line.t),
             Fraction(right_count, judged_count),

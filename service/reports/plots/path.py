@@ -126,9 +126,8 @@ def _format_subtitle(trial: TrialResult) -> str:
     start, end, recording = trial.recording.start, trial.recording.end, trial.recording
     return (
         f"trial {trial.index + 1}; from ({format_whole_number(start.x)}, {format_whole_number(start.y)}) heading "
-        f"{format_heading(start.heading)}° to "
-        f"({format_whole_number(end.x)}, {format_whole_number(end.y)}) heading {format_heading(end.heading)}° in "
-        f"{recording.end_t:.1f} s"
+        f"{format_heading(start.heading)}° to ({format_whole_number(end.x)}, {format_whole_number(end.y)}) heading "
+        f"{format_heading(end.heading)}° in {recording.end_t:.1f} s"
     )
 
 
