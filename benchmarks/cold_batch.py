@@ -22,14 +22,14 @@ from submissions.assignment.folder import REFERENCE
 
 _ASSIGNMENT = "echo-responder"
 _SUBMISSIONS = 10
-_MOST = 3
+_MAX_REPETITIONS = 3
 _WHAT = "ten short submissions, cold batch with reports, wall"
 NBGRADER = os.environ.get("NBGRADER", "")
 
 
 def measure(times: int) -> list[Measurement]:
     """Measure the wall time, and its ratio to nbgrader's if that is available."""
-    count = min(times, _MOST)
+    count = min(times, _MAX_REPETITIONS)
     if not NBGRADER:
         # The first run compiles bytecode.
         _measure_cold_batch()

@@ -21,7 +21,7 @@ from service.store.batches import intake
 from service.store.engine import open_store
 
 #: Budget for that ratio.
-_LARGEST_RATIO = 1.5
+_MAX_RATIO = 1.5
 _TALKER = "import time\nfor number in range({}):\n    print('PY::' + str(number))\n    time.sleep(0.005)\n"
 
 
@@ -66,6 +66,6 @@ def _measure_growth(title: str, cost: Callable[[int], float], smallest: int, tim
         f"growth: {title}",
         late_cost / early_cost,
         RATIO,
-        _LARGEST_RATIO,
+        _MAX_RATIO,
         details=f"{1000 * late_cost:.2f} ms of CPU each",
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 WIDTH, HEIGHT, FPS = 2362, 1143, 30
 _DIAMETER, _SPACING, _WEIGHT = 56, 180, 6
-_MOST = 5000 / _WEIGHT / FPS
+_MAX_SPEED_CHANGE = 5000 / _WEIGHT / FPS
 _SIDE = 20
 _RADIUS = _SIDE / 2
 _RAYS = (0, 7, -7, 14, -14, 21, -21)
@@ -54,9 +54,9 @@ class Motor:
 
     def set_speed(self, noise: float) -> None:
         if self.speed < self.speed_sp:
-            self.speed = min(self.speed + _MOST, self.speed_sp)
+            self.speed = min(self.speed + _MAX_SPEED_CHANGE, self.speed_sp)
         elif self.speed > self.speed_sp:
-            self.speed = max(self.speed - _MOST, self.speed_sp)
+            self.speed = max(self.speed - _MAX_SPEED_CHANGE, self.speed_sp)
         noisy = self.speed + (random.uniform(-noise, noise) if noise > 0 else 0.0)
         if noisy >= 0:
             self.speed = min(_round_half_up(noisy), 1050)

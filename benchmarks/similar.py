@@ -15,7 +15,7 @@ from itertools import combinations
 
 from benchmarks.harness.disguises import DISGUISES
 from models.intervals import compute_wilson_interval
-from service.similarity.similar_sources import FEWEST_TOKENS, SIMILARITY_THRESHOLD, build_source, compare_sources
+from service.similarity.similar_sources import MIN_TOKENS, SIMILARITY_THRESHOLD, build_source, compare_sources
 from service.similarity.sources import collect_given_code
 from submissions.assignment.examples import locate_examples
 from submissions.assignment.folder import REFERENCE, list_catalogue_ids
@@ -41,7 +41,7 @@ def main() -> int:
     """Print the three tables."""
     references = dict(_read_references())
     given_code = {name: collect_given_code(find_assignment(name)) for name, _ in references}
-    print(f"alike from {SIMILARITY_THRESHOLD} on; {FEWEST_TOKENS} own tokens or more")
+    print(f"alike from {SIMILARITY_THRESHOLD} on; {MIN_TOKENS} own tokens or more")
     _print_alarms_within(given_code)
     _print_alarms_between(references, given_code)
     _print_detected_copies(references, given_code)

@@ -64,14 +64,14 @@ class MaxPoolingLayer(Layer):
     """Max pooling over 2 x 2 pixels. Height and width must be even."""
 
     def forward(self, values: Floats) -> Floats:
-        self._upper = values[:, 0::2] >= values[:, 1::2]
+        self._is_upper_larger = values[:, 0::2] >= values[:, 1::2]
         rows = np.maximum(values[:, 0::2], values[:, 1::2])
-        self._left = rows[:, :, 0::2] >= rows[:, :, 1::2]
+        self._is_left_larger = rows[:, :, 0::2] >= rows[:, :, 1::2]
         return np.maximum(rows[:, :, 0::2], rows[:, :, 1::2])
 
     def backward(self, slopes: Floats) -> Floats:
-        rows = _route_gradient(slopes, self._left, axis=2)
-        return _route_gradient(rows, self._upper, axis=1)
+        rows = _route_gradient(slopes, self._is_left_larger, axis=2)
+        return _route_gradient(rows, self._is_upper_larger, axis=1)
 
 
 class ReluLayer(Layer):
@@ -104,11 +104,11 @@ class DropoutLayer(Layer):
 
     def forward(self, values: Floats) -> Floats:
         mask = self._chance.random(values.shape, dtype=np.float32) >= self._share
-        self._kept = mask.astype(np.float32) / np.float32(1 - self._share)
-        return values * self._kept
+        self._scaled_mask = mask.astype(np.float32) / np.float32(1 - self._share)
+        return values * self._scaled_mask
 
     def backward(self, slopes: Floats) -> Floats:
-        return slopes * self._kept
+        return slopes * self._scaled_mask
 
 
 class DenseLayer(Layer):

@@ -28,12 +28,12 @@ from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, Ti
 from sim.world import HashChain, World
 
 _READ_TIME = 10 * MILLISECOND
-_WORDS_A_MINUTE = 130
+_WORDS_PER_MINUTE = 130
 #: Maximum number of actions without a wait. The child counts too and can report the line. One motor action there may
 #: arrive here as two, after the line that it is on.
 _MAX_FREE_ACTIONS = 300_100
-_MOST_NOTES = 200
-_MOST_PLACES = 20_000
+_MAX_NOTES = 200
+_MAX_PLACES = 20_000
 
 
 class _TrialEnded(Exception):
@@ -73,13 +73,15 @@ class Bridge:
         self.places = LineTrace()
         self._places_complete = spec.records_lines
         self._limit = round(spec.seconds * SECOND)
-        self._said_until = 0
+        self._speech_end = 0
         self._arrived: list[str] = []
-        self._free_acts = 0
-        self._entries: dict[str, bytes] = {}  # each sensor read since the last sensing, encoded for the hash chain
-        self._told_until = 0  # the child already has all readings until this time
-        self._told_lines = self._told_images = 0
-        self._output_left = spec.program.output_bytes
+        self._free_action_count = 0
+        self._encoded_readings: dict[
+            str, bytes
+        ] = {}  # each sensor read since the last sensing, encoded for the hash chain
+        self._readings_valid_until = 0  # the child already has all readings until this time
+        self._reported_line_count = self._reported_image_count = 0
+        self._remaining_output_bytes = spec.program.output_bytes
 
     def run(self) -> Fault | None:
         """Serve the program until it ends. Return the fault that ended it, or None."""
@@ -125,8 +127,8 @@ class Bridge:
 
     def collect_logged_data(self) -> LoggedData:
         """Return the data and images that the program has logged since the last call."""
-        lines, images = self.printed[self._told_lines :], self.image_log[self._told_images :]
-        self._told_lines, self._told_images = len(self.printed), len(self.image_log)
+        lines, images = self.printed[self._reported_line_count :], self.image_log[self._reported_image_count :]
+        self._reported_line_count, self._reported_image_count = len(self.printed), len(self.image_log)
         data = (message_format.parse_datum(line.text, line.t) for line in lines)
         return LoggedData(
             tuple((datum.name, datum.value, datum.simtime, datum.t) for datum in data if datum is not None),
@@ -153,15 +155,15 @@ class Bridge:
             case "say":
                 self._say(frame["text"])
             case "until_said":
-                while self.now < self._said_until:
+                while self.now < self._speech_end:
                     self._advance(_READ_TIME)
                 self._reply(None)
             case "stuck":
-                self._raise_never_waits(frame["line"], frame["file"])
+                self._raise_no_wait_fault(frame["line"], frame["file"])
             case "ran" if self._spec.program.executed_statements is not None:
                 self._spec.program.executed_statements.add(frame)
             case "refused":
-                if len(self.notes) < _MOST_NOTES:
+                if len(self.notes) < _MAX_NOTES:
                     self.notes.append(describe_refusal("program", frame))
 
     def _execute_actions(self, actions: Sequence[packets.Action]) -> None:
@@ -179,14 +181,14 @@ class Bridge:
                 self._read_sensor(kind.sensor, int(number) * _READ_TIME)
             elif type(kind) is packets.LineChange:
                 self._count_free_action()
-                self._note_place(number)
+                self._record_line(number)
             else:
                 self._advance(int(number))
                 self._reply(None)
 
     def _advance(self, units: int) -> None:
         """Advance simulated time by ``units``. A tick due exactly at the end of the wait still runs."""
-        self._free_acts = 0
+        self._free_action_count = 0
         end = self.now + units
         last_tick = min(end, self._limit)
         tick = self._spec.tick
@@ -219,18 +221,20 @@ class Bridge:
         """Send the value of every sensor, unless the child already has the readings of this tick."""
         end = self.now + duration
         # A read that ends after the time limit is cut like any wait, even if the child already has the value.
-        is_known = end < self._told_until and end <= self._limit
+        is_known = end < self._readings_valid_until and end <= self._limit
         if is_known:
-            self._free_acts = 0
+            self._free_action_count = 0
             self.now = end
         else:
             self._advance(duration)
             self._values = self.world.collect_readings()
-            self._entries = {}
-            self._told_until = (self.world.clock + 1) * self._spec.tick
-        entry = self._entries.get(sensor)
+            self._encoded_readings = {}
+            self._readings_valid_until = (self.world.clock + 1) * self._spec.tick
+        entry = self._encoded_readings.get(sensor)
         if entry is None:
-            entry = self._entries[sensor] = self.chain.encode_without_time(sensor, format_reading(self._values[sensor]))
+            entry = self._encoded_readings[sensor] = self.chain.encode_without_time(
+                sensor, format_reading(self._values[sensor])
+            )
         self.chain.add_bytes(entry % end)
         if not is_known:
             self._send_readings()
@@ -273,7 +277,7 @@ class Bridge:
             if frame["timeout"] is not None and self.now - start > frame["timeout"]:
                 self._reply(False)
                 return
-        self._free_acts = 0
+        self._free_action_count = 0
         self._reply(True)
 
     def _print(self, text: str) -> None:
@@ -340,19 +344,19 @@ class Bridge:
         self._charge_output(len(text.encode()) + 1, "said")
         self.chain.add("say", self.now, text.encode())
         self.spoken.append(TimedText(self.now / SECOND, text))
-        length = len(text.split()) * 60 * SECOND // _WORDS_A_MINUTE
-        self._said_until = max(self._said_until, self.now) + length
+        length = len(text.split()) * 60 * SECOND // _WORDS_PER_MINUTE
+        self._speech_end = max(self._speech_end, self.now) + length
 
-    def _charge_output(self, size: int, deed: str) -> None:
+    def _charge_output(self, size: int, verb: str) -> None:
         """Charge ``size`` to the program's output limit before the output is stored. Ends the trial at the limit."""
-        self._output_left -= size
-        if self._output_left < 0:
-            sentence = f"the program {deed} more than {self._spec.program.output_bytes} bytes"
+        self._remaining_output_bytes -= size
+        if self._remaining_output_bytes < 0:
+            sentence = f"the program {verb} more than {self._spec.program.output_bytes} bytes"
             raise _TrialEnded(Fault(self.now / SECOND, Verdict.OUTPUT_LIMIT, "program", sentence))
 
-    def _note_place(self, number: float) -> None:
+    def _record_line(self, number: float) -> None:
         """Note a line of the program. Places that are not complete would mislead, so they are dropped."""
-        self._places_complete &= number > 0 and len(self.places) < _MOST_PLACES
+        self._places_complete &= number > 0 and len(self.places) < _MAX_PLACES
         if self._places_complete:
             self._meter.charge_bytes(LINE_BYTES - OBJECT_BYTES)  # a line is no separate object
             self.places.append(self.now / SECOND, *packets.unpack_lines(number))
@@ -360,11 +364,11 @@ class Bridge:
             self.places = LineTrace()
 
     def _count_free_action(self) -> None:
-        self._free_acts += 1
-        if self._free_acts > _MAX_FREE_ACTIONS:
-            self._raise_never_waits(None, None)
+        self._free_action_count += 1
+        if self._free_action_count > _MAX_FREE_ACTIONS:
+            self._raise_no_wait_fault(None, None)
 
-    def _raise_never_waits(self, line: int | None, file: str | None) -> NoReturn:
+    def _raise_no_wait_fault(self, line: int | None, file: str | None) -> NoReturn:
         subject = "this loop never waits" if line is not None else "the program never waits"
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{subject}, so the world cannot move"

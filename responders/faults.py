@@ -16,7 +16,7 @@ from sim.errors import RobomarkError
 from sim.recording import SECOND, Fault, Verdict
 
 _log = logging.getLogger(__name__)
-_LONGEST_HINT = 200
+_MAX_HINT_LENGTH = 200
 _PYTHON_2 = (
     "Missing parentheses in call to",
     "leading zeros in decimal integer literals",
@@ -80,7 +80,7 @@ def build_error_fault(error: Mapping[str, Any], now: int, process_name: str) -> 
     verdict = Verdict.PROGRAM_ERROR if process_name == "program" else Verdict.RESPONDER_ERROR
     text = error["text"]
     sentence = f"{error['type']}: {text}" if text else str(error["type"])
-    hint = error.get("hint", "")[:_LONGEST_HINT]
+    hint = error.get("hint", "")[:_MAX_HINT_LENGTH]
     if error["type"] == "SyntaxError" and text.startswith(_PYTHON_2):
         hint = 'Programs here are Python 3: print is a function and needs brackets, as in print("hello").'
     return _build_fault(now, verdict, process_name, sentence, error["line"], hint, file=error["file"] or "")

@@ -44,7 +44,10 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
     except UnicodeDecodeError:
         return True
     known_modules = {*modules, *STANDARD_MODULES, *_LOADED_MODULES}
-    return any((imported := _find_imports(each)) is None or not known_modules.issuperset(imported) for each in texts)
+    return any(
+        (imported_names := _find_imports(each)) is None or not known_modules.issuperset(imported_names)
+        for each in texts
+    )
 
 
 def build_notebook_source(cells: tuple[str, ...]) -> str:

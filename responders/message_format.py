@@ -13,7 +13,7 @@ from sim.recording import DatalogEntry
 
 PY = "PY::"
 IMG_DATA = "IMG_DATA"
-_LARGEST_NUMBER = 1e15
+_MAX_NUMBER = 1e15
 JSON = "JSON::"
 
 _DATALOG_PREFIXES = (
@@ -71,7 +71,7 @@ def parse_datum(text: str, t: float) -> DatalogEntry | None:
     except ValueError:
         return None
     # Rejects NaN, infinity, and numbers whose sum could overflow.
-    if not all(abs(number) <= _LARGEST_NUMBER for number in numbers):
+    if not all(abs(number) <= _MAX_NUMBER for number in numbers):
         return None
     return DatalogEntry(t, name, numbers[0], numbers[1] if len(numbers) > 1 else None)
 

@@ -18,7 +18,7 @@ from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, build_recording
+from responders.trial import MAX_NOTES, build_recording
 from responders.trial_spec import TrialSpec
 from sim.arena import Arena
 from sim.camera import LightCamera
@@ -26,9 +26,9 @@ from sim.motion import Rectangle
 from sim.recording import SECOND, Fault, Recording, Verdict
 from sim.world import HashChain
 
-_MOST_RUNS = 300
-_LONGEST_LINE = 2000
-_MOST_CELL_ERRORS = 5
+_MAX_RUNS = 300
+_MAX_LINE_LENGTH = 2000
+_MAX_CELL_ERRORS = 5
 #: Limit on the processor time of all unmarked runs together, as a multiple of the limit for one program.
 _UNMARKED_CPU_FACTOR = 4
 #: Limits on the simulated time of all unmarked runs together: seconds, and multiples of the trial's time limit. The
@@ -117,8 +117,8 @@ class ExecutedNotebook:
             recording,
             responder_output=self.output,
             responder_log=self.log,
-            notes=(*recording.notes, *self.notes)[:MOST_NOTES],
-            cell_errors=self.raised[:_MOST_CELL_ERRORS],
+            notes=(*recording.notes, *self.notes)[:MAX_NOTES],
+            cell_errors=self.raised[:_MAX_CELL_ERRORS],
         )
 
 
@@ -221,7 +221,7 @@ class _Execution:
         if frame["do"] == "state":
             return {"do": "state", "state": self._build_state()}
         cell, line = self._process.locate_line(frame["line"])
-        call = MagicCall(cell, line, frame["name"], frame["arguments"][:_LONGEST_LINE], frame["body"])
+        call = MagicCall(cell, line, frame["name"], frame["arguments"][:_MAX_LINE_LENGTH], frame["body"])
         planned_run = self._planner.plan_call(call)
         for note in planned_run.notes:
             self._process.add_note(frame["line"], note)
@@ -255,8 +255,8 @@ class _Execution:
     def _describe_refusal(self, planned_run: PlannedRun, spec: TrialSpec) -> str:
         if planned_run.marked:
             return ""
-        if len(self.runs) >= _MOST_RUNS:
-            return f"the robot was not started: a notebook may start it {_MOST_RUNS} times"
+        if len(self.runs) >= _MAX_RUNS:
+            return f"the robot was not started: a notebook may start it {_MAX_RUNS} times"
         is_too_long = self._unmarked_seconds > max(_UNMARKED_SECONDS, _UNMARKED_RUNS * spec.seconds)
         if is_too_long or self._unmarked_cpu > _UNMARKED_CPU_FACTOR * spec.program.limits.cpu_seconds:
             return "the robot was not started: the runs before have used up the time for runs that are not marked"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from responders.agents import Agents
 
 #: Maximum number of calls of magics that set up or start the robot.
-_MOST_MAGICS = 2000
+_MAX_MAGICS = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +146,8 @@ class NotebookProcess(ResponderProcess):
                 self._add_note(f"{self.raised[-1].place}: {fault.message}; the other cells were run all the same")
             case "magic" | "state":
                 self._magics += 1
-                if self._magics > _MOST_MAGICS:
-                    sentence = f"the notebook called %sim_magic more than {_MOST_MAGICS} times"
+                if self._magics > _MAX_MAGICS:
+                    sentence = f"the notebook called %sim_magic more than {_MAX_MAGICS} times"
                     raise ChildStopped(Verdict.OUTPUT_LIMIT, sentence)
                 if frame["do"] == "magic":
                     self.missing = None if frame["missing"] is None else frame["missing"][:400]

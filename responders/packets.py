@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from responders.wire import LARGEST, MAX_FRAME_BYTES, MAX_UNITS, WireError
+from responders.wire import MAX_FRAME_BYTES, MAX_NUMBER, MAX_UNITS, WireError
 from sim.recording import SENSORS
 
 
@@ -36,7 +36,7 @@ class MotorCommand(NamedTuple):
 class LineChange(NamedTuple):
     """The program has come to another line. The number contains two lines: the innermost and the outermost.
 
-    The number 0 says that no more lines follow, because the program has come to too many.
+    The number 0 means that no more lines follow, because the program exceeded the maximum number of lines.
     """
 
 
@@ -54,8 +54,8 @@ _PORTS = ("outB", "outC")
 _SET_POINTS = ("", "speed_sp", "position_sp", "position", "time_sp")
 _COMMANDS = (None, "", "reset", "run-forever", "run-timed", "run-to-rel-pos", "run-to-abs-pos", "run-direct")
 _READ, _WAIT, _MOVE, _LINE = range(4)
-#: The factor of the outermost line in the number of a place.
-_MOST_LINES = 1 << 20
+#: Packed numbers are ``outer * factor + inner``, for the outermost and innermost line.
+_OUTER_LINE_FACTOR = 1 << 20
 
 
 def _encode_kind(action_code: int, part: int = 0, set_point: int = 0, command: int = 0) -> int:
@@ -65,10 +65,15 @@ def _encode_kind(action_code: int, part: int = 0, set_point: int = 0, command: i
 #: All actions by code: kind, smallest and largest number, and whether the number must be whole.
 _KINDS_BY_CODE: dict[int, tuple[ActionKind, float, float, bool]] = {
     _encode_kind(_WAIT): (Wait(), 0, MAX_UNITS, True),
-    _encode_kind(_LINE): (LineChange(), 0, _MOST_LINES**2, True),
+    _encode_kind(_LINE): (LineChange(), 0, _OUTER_LINE_FACTOR**2, True),
     **{_encode_kind(_READ, part): (SensorRead(what), 1, 2, True) for part, what in enumerate(SENSORS)},
     **{
-        _encode_kind(_MOVE, part, place, number): (MotorCommand(port, set_point, command), -LARGEST, LARGEST, False)
+        _encode_kind(_MOVE, part, place, number): (
+            MotorCommand(port, set_point, command),
+            -MAX_NUMBER,
+            MAX_NUMBER,
+            False,
+        )
         for (part, port), (place, set_point), (number, command) in itertools.product(
             enumerate(_PORTS), enumerate(_SET_POINTS), enumerate(_COMMANDS)
         )
@@ -109,7 +114,7 @@ def unpack_actions(packet: bytes) -> list[Action]:
 
 def unpack_lines(line_pair: float) -> tuple[int, int]:
     """Return the innermost and the outermost line in the number of a place."""
-    outer, inner = divmod(int(line_pair), _MOST_LINES)
+    outer, inner = divmod(int(line_pair), _OUTER_LINE_FACTOR)
     return inner, outer
 
 

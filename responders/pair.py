@@ -15,7 +15,7 @@ from responders.logger_file import read_log
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.trial import MOST_NOTES, build_recording
+from responders.trial import MAX_NOTES, build_recording
 from responders.trial_spec import PartnerSpec, TrialSpec
 from sim.camera import LightCamera
 from sim.recording import Fault, Recording, Verdict
@@ -79,7 +79,7 @@ def run_pair(
         recording,
         responder_output="\n".join(responder.output),
         responder_log=log,
-        notes=(*recording.notes, *responder.notes)[:MOST_NOTES],
+        notes=(*recording.notes, *responder.notes)[:MAX_NOTES],
     )
 
 

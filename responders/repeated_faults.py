@@ -30,10 +30,10 @@ _LIMIT_VERDICTS = frozenset({Verdict.CPU_LIMIT, Verdict.STALLED})
 #: Faults that are expensive to repeat, by the role of the child that caused them.
 _COSTLY_VERDICTS = MappingProxyType({"robot": _LIMIT_VERDICTS | {Verdict.PROGRAM_ERROR}, "responder": _LIMIT_VERDICTS})
 #: Limits on the recorded steps of one child, and on failed attempts to replay it.
-_MOST_STEPS, _MOST_BYTES = 20_000, 8 << 20
+_MAX_STEPS, _MAX_BYTES = 20_000, 8 << 20
 _MAX_FAILED_REPLAYS = 3
 #: Maximum length of the texts that are searched for randomness. Longer ones count as using it.
-_MOST_CHARACTERS = 100_000
+_MAX_CHARACTERS = 100_000
 #: Modules without access to randomness. Any other import may give access to it.
 _DETERMINISTIC_MODULES = frozenset(
     ["collections", "ev3dev2", "ev3dev2_glue", "functools", "itertools", "json", "math", "re", "string", "time"]
@@ -68,13 +68,13 @@ class _ChildRecording:
     first: wire.Frame
     sandbox: str
     steps: list[_ChildInput | _ChildOutput] = field(default_factory=list)
-    bytes_left: int = _MOST_BYTES
+    bytes_left: int = _MAX_BYTES
     is_complete: bool = True
     is_repeatable: bool = True  # whether the same limit is certain to be exceeded again
 
     def add(self, step: _ChildInput | _ChildOutput, size: int) -> None:
         self.bytes_left -= size
-        if self.bytes_left < 0 or len(self.steps) >= _MOST_STEPS:
+        if self.bytes_left < 0 or len(self.steps) >= _MAX_STEPS:
             self.is_complete = False
             self.steps.clear()
         if self.is_complete:
@@ -98,7 +98,7 @@ class FaultReplay:
 
     def __init__(self) -> None:
         self._last: Fault | None = None
-        self._heard: list[_ChildRecording] = []
+        self._new_recordings: list[_ChildRecording] = []
         self._known: list[_ChildRecording] = []
         self._misses = 0
         self._diverged = False  # whether this trial runs real children after a divergence
@@ -115,7 +115,7 @@ class FaultReplay:
             return spawn()
         if self._known:
             return _ReplayedChild(self._known, folder, meter, spawn, self._record_replay)
-        return _RecordedChild(spawn(), folder, meter, self._heard)
+        return _RecordedChild(spawn(), folder, meter, self._new_recordings)
 
     def record_trial(self, recording: Recording) -> Recording:
         """Record that a trial has ended. Return its recording, with a note if a child was replayed."""
@@ -124,13 +124,13 @@ class FaultReplay:
         if is_replayed and self._last is not None:
             return replace(recording, notes=(*recording.notes, REPLAY_NOTES[_find_role(self._last)]))
         if not self._known and fault is not None and self._last is not None and _is_same_failure(fault, self._last):
-            self._known = [part for part in self._heard if part.is_complete]
+            self._known = [part for part in self._new_recordings if part.is_complete]
             if not all(part.is_repeatable for part in self._known):
                 # Too close to the limit, another trial may end differently. So all trials are run and measuring stops.
                 self._known, self._misses = [], _MAX_FAILED_REPLAYS
         if not self._known:
             self._last = fault
-        self._heard = []
+        self._new_recordings = []
         return recording
 
     def record_divergence(self) -> None:
@@ -148,7 +148,7 @@ class _RecordedChild:
     def __init__(self, child: Child, folder: Path | None, meter: JobMeter, parts: list[_ChildRecording]) -> None:
         self._child, self._folder, self._meter, self._parts = child, folder, meter, parts
         self._part: _ChildRecording | None = None
-        self._begun = False
+        self._has_started = False
         self._spoke = 0.0  # processor seconds at its last frame
         self.sandbox = child.sandbox
 
@@ -156,10 +156,10 @@ class _RecordedChild:
         self._child.send(frame, entries)
         if self._part is not None:
             self._part.add(_ChildInput(frame, tuple(entries)), sum(map(len, entries)) + len(str(frame)))
-        elif not self._begun and _is_independent(frame) and not _may_use_chance(frame, self._folder):
+        elif not self._has_started and _is_independent(frame) and not _may_use_chance(frame, self._folder):
             self._part = _ChildRecording(_remove_seed(frame), self.sandbox)
             self._child.measured = True
-        self._begun = True
+        self._has_started = True
 
     def send_readings(self, units: int, values: Sequence[float]) -> None:
         self._child.send_readings(units, values)
@@ -309,11 +309,11 @@ def _may_use_chance(frame: Mapping[str, Any], folder: Path | None) -> bool:
     if folder is not None:
         modules |= {file.stem: file.read_text("utf-8", "replace") for file in folder.glob("*.py")}
     texts = [frame["text"], *modules.values()]
-    if sum(map(len, texts)) > _MOST_CHARACTERS:
+    if sum(map(len, texts)) > _MAX_CHARACTERS:
         return True
     texts = list(map(_normalise_characters, texts))
     # Normalising can make a text up to 18 times as long.
-    return sum(map(len, texts)) > _MOST_CHARACTERS or any(
+    return sum(map(len, texts)) > _MAX_CHARACTERS or any(
         _UNSAFE_NAMES.search(text) or not _find_imports(text) <= _DETERMINISTIC_MODULES | modules.keys()
         for text in texts
     )

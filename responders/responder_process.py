@@ -28,9 +28,9 @@ from sim.recording import SECOND, Call, Fault, Verdict
 if TYPE_CHECKING:
     from responders.agents import Agents
 
-_MOST_NOTES = 200
+_MAX_NOTES = 200
 #: Maximum number of recorded calls, and of characters in each of their parts.
-_MOST_CALLS, _MOST_SHOWN = 10_000, 200
+_MAX_CALLS, _MAX_RECORDED_LENGTH = 10_000, 200
 _RETURN_HINT = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
 _JSON_HINT = 'For an object return "JSON::" + json.dumps(the object).'
 
@@ -168,7 +168,7 @@ class ResponderProcess:
             case "long":
                 description = f"an answer of {frame['length']} characters; the most is about 60000"
             case _:
-                description = f"{frame['type'][:_MOST_SHOWN]} instead of a text; an answer has to be a str"
+                description = f"{frame['type'][:_MAX_RECORDED_LENGTH]} instead of a text; an answer has to be a str"
                 hint = _RETURN_HINT if frame["type"] == "NoneType" else _JSON_HINT
         return Answer(fault=self._build_protocol_fault(t, describe_wrong_return(description), hint))
 
@@ -201,8 +201,10 @@ class ResponderProcess:
             case "sleep":
                 self._slept += frame["units"]
             case "call":
-                if len(self.calls) < _MOST_CALLS:
-                    texts = {name: frame[name][:_MOST_SHOWN] for name in ("caller", "callee", "argument", "result")}
+                if len(self.calls) < _MAX_CALLS:
+                    texts = {
+                        name: frame[name][:_MAX_RECORDED_LENGTH] for name in ("caller", "callee", "argument", "result")
+                    }
                     message_count = len(self._agents.messages) if self._agents is not None else 0
                     self.calls.append(Call(self._message, frame["depth"], before=message_count, **texts))
             case "ask" if self._agents is not None and self._child is not None:
@@ -214,7 +216,7 @@ class ResponderProcess:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, f"the {self._who}'s process sent a stray {kind} frame")
 
     def _add_note(self, sentence: str) -> None:
-        if len(self.notes) < _MOST_NOTES and sentence not in self.notes:
+        if len(self.notes) < _MAX_NOTES and sentence not in self.notes:
             self.notes.append(sentence)
 
     def _print(self, text: str) -> None:

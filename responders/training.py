@@ -23,7 +23,7 @@ from responders.source_file import SourceFile
 from sim.recording import Fault, Verdict
 
 #: Maximum number of pixels per frame. A larger image is sent alone.
-_PIXELS_A_CALL = 30_000
+_MAX_CALL_PIXELS = 30_000
 
 Images = NDArray[np.uint8]
 
@@ -100,7 +100,7 @@ def _collect_predictions(
         for chunk, call_result in zip(group, call_results.returned[end:], strict=False):
             chunk_labels = _parse_labels(call_result, len(chunk)) if is_trained else None
             if chunk_labels is None and fault is None:
-                fault = call_result.fault or _build_answer_fault()
+                fault = call_result.fault or _build_invalid_prediction_fault()
             names += chunk_labels or [None] * len(chunk)
         end += len(group)
         missing_count = sum(map(len, group)) - len(names)
@@ -109,14 +109,14 @@ def _collect_predictions(
         yield Predictions((*names, *[None] * missing_count), _drop_harness_line(fault, spec), output, notes)
 
 
-def _parse_labels(returned: CallResult, count: int) -> list[str | None] | None:
-    value = returned.value
+def _parse_labels(call_result: CallResult, count: int) -> list[str | None] | None:
+    value = call_result.value
     if isinstance(value, list) and len(value) == count and all(isinstance(name, str) for name in value):
         return list(value)
     return None
 
 
-def _build_answer_fault() -> Fault:
+def _build_invalid_prediction_fault() -> Fault:
     return Fault(
         0.0, Verdict.RESPONDER_ERROR, "responder", "the model's predict gave something that is no list of names"
     )
@@ -130,8 +130,8 @@ def _drop_harness_line(fault: Fault | None, spec: TrainingSpec) -> Fault | None:
 
 
 def _split_images(images: Images) -> list[Images]:
-    each = max(1, _PIXELS_A_CALL // max(1, images.shape[1] * images.shape[2])) if len(images) else 1
-    return [images[start : start + each] for start in range(0, len(images), each)]
+    chunk_size = max(1, _MAX_CALL_PIXELS // max(1, images.shape[1] * images.shape[2])) if len(images) else 1
+    return [images[start : start + chunk_size] for start in range(0, len(images), chunk_size)]
 
 
 def _encode_images(images: Images) -> str:

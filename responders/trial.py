@@ -19,7 +19,7 @@ from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.recording import SECOND, Fault, Recording, Verdict
 
-MOST_NOTES = 40
+MAX_NOTES = 40
 
 
 def run_trial(
@@ -72,7 +72,7 @@ def run_trial(
         calls=tuple(responder.calls),
         responder_output="\n".join(responder.output),
         responder_log=log,
-        notes=(*recording.notes, *responder.notes, *(agents.notes if agents is not None else ()))[:MOST_NOTES],
+        notes=(*recording.notes, *responder.notes, *(agents.notes if agents is not None else ()))[:MAX_NOTES],
     )
     return recording if agents is None else agents.add_outputs(agents.add_messages_and_calls(recording, AgentCounts()))
 
@@ -104,6 +104,6 @@ def build_recording(spec: TrialSpec, bridge: Bridge, faults: tuple[Fault, ...], 
         robot=spec.robot.name,
         pen=((0, True),) if spec.pen_down else (),
         sandbox=sandbox,
-        notes=tuple(bridge.notes)[:MOST_NOTES],
+        notes=tuple(bridge.notes)[:MAX_NOTES],
         places=bridge.places,
     )

@@ -26,7 +26,7 @@ from sim.robot import Robot
 from sim.world import Noise
 
 _LIBRARY_NAME = re.compile(rf"\b(?:{'|'.join(LIBRARIES)})\b")
-_MOST_STATEMENTS = 100_000
+_MAX_STATEMENTS = 100_000
 Preamble = Literal["none", "imports", "preloaded"]
 
 
@@ -38,7 +38,7 @@ class ExecutedStatements:
 
     def add(self, frame: Mapping[str, Any]) -> None:
         """Add the statement of a ``ran`` frame."""
-        if len(self.places) < _MOST_STATEMENTS:
+        if len(self.places) < _MAX_STATEMENTS:
             self.places.add((frame["file"] or "", frame["line"], frame["column"]))
 
 

@@ -26,7 +26,7 @@ class WireError(Exception):
 Check = Callable[[object], bool]
 
 #: Largest absolute number in a frame.
-LARGEST = sys.float_info.max
+MAX_NUMBER = sys.float_info.max
 
 
 def _is_text(value: object) -> bool:
@@ -43,7 +43,7 @@ def _is_flag(value: object) -> bool:
 
 def _is_number(value: object) -> bool:
     # A very large int is finite but doesn't fit a float.
-    return type(value) in (int, float) and -LARGEST <= value <= LARGEST  # type: ignore[operator]
+    return type(value) in (int, float) and -MAX_NUMBER <= value <= MAX_NUMBER  # type: ignore[operator]
 
 
 def _reject_unpacked(_: object) -> bool:

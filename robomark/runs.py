@@ -19,8 +19,8 @@ from sim.recording import Recording
 from submissions.magics import parse_flags
 
 _DATA_SCRIPT = re.compile(rb'<script type="application/json">(.*?)</script>')
-_MOST_BYTES = 256 << 20
-_MOST_VALUES = 20_000_000
+_MAX_BYTES = 256 << 20
+_MAX_VALUES = 20_000_000
 
 
 def run_program(
@@ -60,7 +60,7 @@ def read_replay(path: str | os.PathLike[str]) -> dict[str, Any]:
     file = Path(path)
     content = standalone_runs.read_file(file)
     try:
-        data = read_json(content if file.suffix.lower() == ".json" else _unpack_page(content), most_values=_MOST_VALUES)
+        data = read_json(content if file.suffix.lower() == ".json" else _unpack_page(content), max_values=_MAX_VALUES)
     except (ValueError, KeyError, TypeError, zlib.error) as error:
         raise UsageError(f"{file} is not a replay; expected a file that --replay or --report has written") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
@@ -78,7 +78,7 @@ def _unpack_page(page: bytes) -> bytes:
     if match is None:
         raise ValueError("the page has no data")
     unpack = zlib.decompressobj()
-    data = unpack.decompress(base64.b64decode(read_json(match[1])["deflated"]), _MOST_BYTES)
+    data = unpack.decompress(base64.b64decode(read_json(match[1])["deflated"]), _MAX_BYTES)
     if unpack.unconsumed_tail:
-        raise ValueError(f"the page has more than {_MOST_BYTES >> 20} MB of data")
+        raise ValueError(f"the page has more than {_MAX_BYTES >> 20} MB of data")
     return data

@@ -20,7 +20,7 @@ from sim.errors import RobomarkError
 
 #: Time limit for the whole request, from the connection to the end of the body.
 TIMEOUT_SECONDS = 10.0
-_MOST_ADDRESSES = 20
+_MAX_ADDRESSES = 20
 Networks = Sequence[IPv4Network | IPv6Network]
 #: No networks besides public addresses.
 NO_NETWORKS: Networks = ()
@@ -68,11 +68,11 @@ class _ParsedUrl:
 
 
 def send_request(
-    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], allowlist: Networks, most_bytes: int = 0
+    url: str, *, method: str, body: bytes | None, headers: Mapping[str, str], allowlist: Networks, max_bytes: int = 0
 ) -> HttpResponse:
     """Send a request and return the response, without following redirections.
 
-    ``allowlist`` are permitted networks in addition to public addresses. Raises NotReached.
+    ``allowlist`` contains the permitted networks in addition to public addresses. Raises RequestFailure.
     """
     target = _parse_url(url)
     addresses = _resolve_addresses(target, allowlist)
@@ -87,7 +87,7 @@ def send_request(
             closing(http.client.HTTPConnection(target.host, target.port, timeout=TIMEOUT_SECONDS)) as connection,
         ):
             try:
-                answer = _send_on_socket(connection, sock, target, method, body, headers, most_bytes)
+                response = _send_on_socket(connection, sock, target, method, body, headers, max_bytes)
             finally:
                 # If the timer has fired, the response is incomplete.
                 is_late = timer.finished.is_set()
@@ -96,7 +96,7 @@ def send_request(
         raise RequestFailure(f"{target.host} did not answer: {type(error).__name__}") from None
     if is_late:
         raise RequestFailure(f"{target.host} did not answer within {TIMEOUT_SECONDS:g} seconds")
-    return answer
+    return response
 
 
 def _send_on_socket(
@@ -106,7 +106,7 @@ def _send_on_socket(
     method: str,
     body: bytes | None,
     headers: Mapping[str, str],
-    most_bytes: int,
+    max_bytes: int,
 ) -> HttpResponse:
     if isinstance(sock, ssl.SSLSocket):
         sock.do_handshake()
@@ -115,9 +115,9 @@ def _send_on_socket(
     default_port = {"https": 443, "http": 80}[target.scheme]
     host_header = host if target.port == default_port else f"{host}:{target.port}"
     connection.request(method, target.path, body, {"Host": host_header, "Connection": "close", **headers})
-    answer = connection.getresponse()
-    response_headers = {name.lower(): value for name, value in answer.getheaders()}
-    return HttpResponse(answer.status, response_headers, answer.read(most_bytes + 1) if most_bytes else b"")
+    response = connection.getresponse()
+    response_headers = {name.lower(): value for name, value in response.getheaders()}
+    return HttpResponse(response.status, response_headers, response.read(max_bytes + 1) if max_bytes else b"")
 
 
 def _parse_url(url: str) -> _ParsedUrl:
@@ -135,11 +135,11 @@ def _parse_url(url: str) -> _ParsedUrl:
 def _resolve_addresses(target: _ParsedUrl, allowlist: Networks) -> list[str]:
     """Return the addresses to connect to.
 
-    Raises NotReached if the name is unknown, or any address is neither public nor in ``allowlist``. The message is the
-    same for both, because it would otherwise reveal internal names.
+    Raises RequestFailure if the name is unknown, or any address is neither public nor in ``allowlist``. The message is
+    the same for both, because it would otherwise reveal internal names.
     """
     try:
-        address_infos = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MOST_ADDRESSES]
+        address_infos = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM)[:_MAX_ADDRESSES]
     except (OSError, UnicodeError):
         address_infos = []
     addresses = [str(each[4][0]) for each in address_infos]

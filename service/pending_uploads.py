@@ -23,9 +23,9 @@ from submissions.student_identity import RejectedSubmission
 
 _RETENTION_SECONDS = 24 * 3600
 _UNREADABLE_SECONDS = 60
-_MOST_OF_ONE, _MOST_OF_ALL = 3, 30
-_MOST_FILES = 1000
-_LONGEST_NAME = 200
+_MAX_UPLOADS_PER_PERSON, _MAX_UPLOADS = 3, 30
+_MAX_FILES = 1000
+_MAX_NAME_LENGTH = 200
 _METADATA_FILE = "upload.json"
 _REMOVED = "this upload was removed, because too many uploads are waiting for confirmation; upload the files again"
 
@@ -77,18 +77,18 @@ class PendingUploads:
         self._folder.mkdir(mode=0o700, exist_ok=True)
         uploads = self._list_recent()
         own_folders = [upload for upload in uploads if upload.person_id == person_id]
-        for upload in own_folders[: max(0, len(own_folders) - _MOST_OF_ONE + 1)]:
+        for upload in own_folders[: max(0, len(own_folders) - _MAX_UPLOADS_PER_PERSON + 1)]:
             self.remove(upload)
             uploads.remove(upload)
-        while len(uploads) >= _MOST_OF_ALL:
+        while len(uploads) >= _MAX_UPLOADS:
             counts = Counter(upload.person_id for upload in uploads)
-            oldest = max(uploads, key=lambda upload: counts[upload.person_id])
-            self.remove(oldest)
-            uploads.remove(oldest)
-        made = PendingUpload(secrets.token_hex(16), person_id, course_id, "", assignment, "", "")
-        (self._folder / made.id).mkdir(mode=0o700)
-        self.write(made)
-        return made
+            oldest_upload = max(uploads, key=lambda upload: counts[upload.person_id])
+            self.remove(oldest_upload)
+            uploads.remove(oldest_upload)
+        upload_record = PendingUpload(secrets.token_hex(16), person_id, course_id, "", assignment, "", "")
+        (self._folder / upload_record.id).mkdir(mode=0o700)
+        self.write(upload_record)
+        return upload_record
 
     def write(self, upload: PendingUpload) -> None:
         """Save the metadata of an upload. Raises UsageError if the upload was removed meanwhile."""
@@ -135,8 +135,8 @@ class PendingUploads:
         Raises:
             UsageError: There are too many files, a name is invalid or occurs twice, or the upload was removed.
         """
-        if len(files) > _MOST_FILES:
-            raise UsageError(f"{len(files)} files were uploaded, expected at most {_MOST_FILES}, or one zip of them")
+        if len(files) > _MAX_FILES:
+            raise UsageError(f"{len(files)} files were uploaded, expected at most {_MAX_FILES}, or one zip of them")
         folder = self._folder / upload.id / subfolder
         try:
             folder.mkdir(mode=0o700)
@@ -146,7 +146,7 @@ class PendingUploads:
 
     def _list_recent(self) -> list[PendingUpload]:
         """Return the uploads, oldest first, after removing expired ones; other threads may remove uploads meanwhile."""
-        found = []
+        recent_uploads = []
         for path in self._folder.iterdir() if self._folder.is_dir() else ():
             age = time.time() - _read_time(path)
             upload = self._read_metadata(path.name)
@@ -154,8 +154,8 @@ class PendingUploads:
             if age > (_UNREADABLE_SECONDS if upload is None else _RETENTION_SECONDS):
                 shutil.rmtree(path, ignore_errors=True)
             elif upload is not None:
-                found.append((age, upload))
-        return [upload for _, upload in sorted(found, key=lambda each: -each[0])]
+                recent_uploads.append((age, upload))
+        return [upload for _, upload in sorted(recent_uploads, key=lambda each: -each[0])]
 
     def _read_metadata(self, upload_id: str) -> PendingUpload | None:
         try:
@@ -191,6 +191,6 @@ def clean_file_name(file: UploadedFile) -> str:
     name = "".join("?" if unicodedata.category(c)[0] == "C" else c for c in file.flat_name).strip().lstrip(".")
     if not name:
         raise UsageError("a file without a name was uploaded, expected a name that identifies its student")
-    if len(name.encode()) > _LONGEST_NAME:
-        raise UsageError(f"the name {sanitise_name(name)} is too long, expected at most {_LONGEST_NAME} bytes")
+    if len(name.encode()) > _MAX_NAME_LENGTH:
+        raise UsageError(f"the name {sanitise_name(name)} is too long, expected at most {_MAX_NAME_LENGTH} bytes")
     return name

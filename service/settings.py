@@ -20,7 +20,7 @@ from submissions.seeds import PUBLIC_SECRET, Secret
 PREFIX = "ROBOMARK_"
 #: Variable with a folder whose files are named after settings; systemd uses the same name.
 SECRET_FILES = "CREDENTIALS_DIRECTORY"
-_SHORTEST_SECRET = 16
+_MIN_SECRET_LENGTH = 16
 _PARSER = "read"
 Written = TypeVar("Written", str, Path)
 
@@ -106,8 +106,8 @@ def _parse_log_level(level: str) -> str:
 
 def _parse_secret(value: str | Secret) -> Secret:
     text = value.text if isinstance(value, Secret) else value.strip()
-    if 0 < len(text) < _SHORTEST_SECRET:
-        raise ValueError(f"expected at least {_SHORTEST_SECRET} characters that are hard to guess")
+    if 0 < len(text) < _MIN_SECRET_LENGTH:
+        raise ValueError(f"expected at least {_MIN_SECRET_LENGTH} characters that are hard to guess")
     return Secret(text)
 
 

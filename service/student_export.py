@@ -28,7 +28,7 @@ from service.store.web_tables import Appeal, Credential, Tryout
 from submissions.student_names import normalise_name
 
 #: Number of submissions fetched at once.
-_AT_ONCE = 10
+_CHUNK_SIZE = 10
 
 
 def export_student(store: Store, enrolment_id: int, hidden_assignments: Set[str] = frozenset()) -> bytes:
@@ -111,7 +111,7 @@ def _load_submissions(session: Session, condition: ColumnElement[bool]) -> Itera
     names = ("assignment", "attempt", "source", "sha256", "created_at", "submitted_at", "days_late", "staff_only")
     columns = ("text", "asked_at", "answer", "answered_at")
     query = select(SubmissionRow, SubmissionRow.packed).where(condition).order_by(SubmissionRow.id)
-    for row, packed_submission in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+    for row, packed_submission in session.execute(query, execution_options={"yield_per": _CHUNK_SIZE}):
         appeal_fields = [_read_columns(each, columns) for each in appeals.get(row.id, ())]
         yield row.id, {**_read_columns(row, names), "appeals": appeal_fields}, packed_submission
 
@@ -136,7 +136,7 @@ def _load_test_runs(
     query = query.where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment.not_in(without))
     names = ("state", "queued_at", "finished_at", "words", "error")
     ordered = query.order_by(Tryout.queued_at, Tryout.id)
-    for row, assignment, packed, replay in session.execute(ordered, execution_options={"yield_per": _AT_ONCE}):
+    for row, assignment, packed, replay in session.execute(ordered, execution_options={"yield_per": _CHUNK_SIZE}):
         files = {"submission.zip": packed} if packed else {}
         if replay:
             files["replay.json"] = zlib.decompress(replay)

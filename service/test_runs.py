@@ -29,10 +29,10 @@ from submissions.submission import PART_FILES, Submission
 from submissions.sweep import NO_SWEEP
 
 #: Simulated seconds; less if the assignment's own limit is shorter.
-LONGEST_SECONDS = 30.0
+MAX_SECONDS = 30.0
 _PROGRAM_CPU, _RESPONDER_CPU, _ALL_CPU, _ALL_SLEEP, _ALL_OUTPUT_MB = 3.0, 5.0, 10.0, 10.0, 8
-_MOST_LINES = 400
-_LONGEST_LINE = 400
+_MAX_LINES = 400
+_MAX_LINE_LENGTH = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def build_single_trial_assignment(assignment: Assignment) -> Assignment | None:
         second_poses=visible_scenario.second_poses[:1],
         choose="each",
         trials=1,
-        seconds=min(visible_scenario.seconds, LONGEST_SECONDS),
+        seconds=min(visible_scenario.seconds, MAX_SECONDS),
         light_noise=visible_scenario.light_noise[:1],
         motor_noise=visible_scenario.motor_noise[:1],
         sweep=NO_SWEEP,
@@ -112,12 +112,12 @@ def _build_result(run: Grade, submission: Submission) -> dict[str, Any]:
         "happened": outcome.happened,
         "whose": outcome.whose,
         "seconds": run.trials[0].recording.end_t if run.trials else 0.0,
-        "lines": [[round(t, 2), to_display_text(text, _LONGEST_LINE)] for t, text in lines[:_MOST_LINES]],
-        "more_lines": max(0, len(lines) - _MOST_LINES),
+        "lines": [[round(t, 2), to_display_text(text, _MAX_LINE_LENGTH)] for t, text in lines[:_MAX_LINES]],
+        "more_lines": max(0, len(lines) - _MAX_LINES),
         "faults": [
             {"where": fault.where, "message": fault.message, "hint": fault.hint}
             for fault in group_faults(run, submission)
         ],
         "failed": format_moment_link(1, faults[0].t) if faults else "",
-        "notes": [to_display_text(text, _LONGEST_LINE) for text in notes],
+        "notes": [to_display_text(text, _MAX_LINE_LENGTH) for text in notes],
     }

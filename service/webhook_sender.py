@@ -23,7 +23,7 @@ from service.version import GRADER_VERSION
 
 _log = structlog.get_logger(__name__)
 _POLL_SECONDS = 2.0
-_AT_ONCE = 8
+_MAX_CONCURRENT_DELIVERIES = 8
 
 
 class WebhookSender:
@@ -31,7 +31,7 @@ class WebhookSender:
 
     def __init__(self, store: Store, allowlist: Networks) -> None:
         self._store = store
-        self._others = allowlist
+        self._allowlist = allowlist
         self._ended = Event()
         self._thread = Thread(target=self._run, name="webhooks", daemon=True)
 
@@ -45,12 +45,14 @@ class WebhookSender:
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
-        with ThreadPoolExecutor(_AT_ONCE) as pool:
+        with ThreadPoolExecutor(_MAX_CONCURRENT_DELIVERIES) as pool:
             running: set[Future[None]] = set()
             while not self._ended.is_set():
                 started: set[Future[None]] = set()
                 try:
-                    started = start_due_deliveries(self._store, self._others, pool, _AT_ONCE - len(running))
+                    started = start_due_deliveries(
+                        self._store, self._allowlist, pool, _MAX_CONCURRENT_DELIVERIES - len(running)
+                    )
                 except Exception:
                     _log.exception("webhooks.failed")
                 running |= started
@@ -61,10 +63,10 @@ class WebhookSender:
                     self._ended.wait(_POLL_SECONDS)
 
 
-def start_due_deliveries(store: Store, others: Networks, pool: Executor, most: int) -> set[Future[None]]:
-    """Start to send up to ``most`` due deliveries, and return their futures."""
-    claimed = outbox.claim_deliveries(store, most) if most > 0 else []
-    return {pool.submit(_send_delivery, store, each, others) for each in claimed}
+def start_due_deliveries(store: Store, allowlist: Networks, pool: Executor, limit: int) -> set[Future[None]]:
+    """Start to send up to ``limit`` due deliveries, and return their futures."""
+    deliveries = outbox.claim_deliveries(store, limit) if limit > 0 else []
+    return {pool.submit(_send_delivery, store, each, allowlist) for each in deliveries}
 
 
 def sign_body(secret: str, sent_at: int, body: bytes) -> str:
@@ -81,23 +83,23 @@ def _send_delivery(store: Store, delivery: ClaimedDelivery, allowlist: Networks)
         _log.exception("webhooks.failed")
 
 
-def _send_and_record(store: Store, claimed: ClaimedDelivery, others: Networks) -> None:
+def _send_and_record(store: Store, delivery: ClaimedDelivery, allowlist: Networks) -> None:
     body = json.dumps(
-        {"id": claimed.id, "event": claimed.event, "made_at": claimed.made_at.isoformat(), **claimed.payload}
+        {"id": delivery.id, "event": delivery.event, "made_at": delivery.made_at.isoformat(), **delivery.payload}
     ).encode()
     headers = {
         "Content-Type": "application/json",
         "User-Agent": f"Robomark/{GRADER_VERSION}",
-        "Robomark-Event": claimed.event,
-        "Robomark-Delivery": claimed.id,
-        "Robomark-Signature": sign_body(claimed.secret, int(time.time()), body),
+        "Robomark-Event": delivery.event,
+        "Robomark-Delivery": delivery.id,
+        "Robomark-Signature": sign_body(delivery.secret, int(time.time()), body),
     }
     try:
-        status = send_request(claimed.url, method="POST", body=body, headers=headers, allowlist=others).status
+        status = send_request(delivery.url, method="POST", body=body, headers=headers, allowlist=allowlist).status
     except RequestFailure as error:
-        outbox.record_failure(store, claimed, str(error))
+        outbox.record_failure(store, delivery, str(error))
         return
     if 200 <= status < 300:
-        outbox.record_delivery(store, claimed)
+        outbox.record_delivery(store, delivery)
     else:
-        outbox.record_failure(store, claimed, f"answered {status}, expected 200 or another of 2xx")
+        outbox.record_failure(store, delivery, f"answered {status}, expected 200 or another of 2xx")

@@ -100,9 +100,9 @@ class Arena:
                 groups |= group
         if not groups:
             return _RANGE
-        return self._nearest_hit(x, y, heading, forward, groups)
+        return self._measure_nearest_hit(x, y, heading, forward, groups)
 
-    def _nearest_hit(self, x: float, y: float, heading: float, forward: float, groups: int) -> float:
+    def _measure_nearest_hit(self, x: float, y: float, heading: float, forward: float, groups: int) -> float:
         """Return the distance to the nearest hit of any ray in these collision groups, in whole mm."""
         sine, cosine = sincos(heading)
         start = ((x + cosine * forward) * _METRE, (y + sine * forward) * _METRE, 0.0)

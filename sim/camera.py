@@ -164,7 +164,7 @@ class CachedCamera:
         """Create the camera. ``pixels`` has shape (1143, 2362, 3), row 0 at the top."""
         self._pixels = pixels
         self._camera: BulletCamera | None = None
-        self._seen = _WHOLE
+        self._loaded_part = _WHOLE
         self._tiles: dict[tuple[int, int, int], Bytes] = {}
         self._sums: dict[tuple[int, int, int], memoryview] = {}
 
@@ -208,15 +208,17 @@ class CachedCamera:
                 return printed
         if self._camera is None:
             self._open_camera(_FloorPart(column - _TILE, row - _TILE, column + 3 * _TILE, row + 3 * _TILE))
-        elif not self._seen.contains_window(column, row, side):
+        elif not self._loaded_part.contains_window(column, row, side):
             self.close()
             self._open_camera(_WHOLE)
         assert self._camera is not None
-        return self._camera.render_window(column - self._seen.left, row - self._seen.top, side)
+        return self._camera.render_window(column - self._loaded_part.left, row - self._loaded_part.top, side)
 
     def _open_camera(self, part: _FloorPart) -> None:
-        self._seen = _FloorPart(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
-        self._camera = BulletCamera(self._pixels[self._seen.top : part.bottom, self._seen.left : part.right])
+        self._loaded_part = _FloorPart(max(part.left, 0), max(part.top, 0), part.right, part.bottom)
+        self._camera = BulletCamera(
+            self._pixels[self._loaded_part.top : part.bottom, self._loaded_part.left : part.right]
+        )
 
 
 def _compute_disc_sums(tile: Bytes, side: int) -> memoryview:
@@ -238,7 +240,7 @@ class Cameras:
 
     def __init__(self, capacity: int = 3) -> None:
         """Create the cache. A camera's tiles take up to 50 MB once a robot has covered its floor."""
-        self._most = capacity
+        self._capacity = capacity
         # The keys are object ids. Holding the image prevents reuse of its id.
         self._cameras: OrderedDict[int, tuple[Bytes, CachedCamera]] = OrderedDict()
 
@@ -247,7 +249,7 @@ class Cameras:
         entry = self._cameras.pop(id(pixels), None)
         self.close()
         if entry is None:
-            while len(self._cameras) >= self._most:
+            while len(self._cameras) >= self._capacity:
                 self._cameras.popitem(last=False)
             entry = pixels, CachedCamera(pixels)
         self._cameras[id(pixels)] = entry

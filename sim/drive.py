@@ -122,8 +122,8 @@ class Drive:
         """Advance by one tick: update the speeds, the wheel travel and the pose, in this order."""
         max_change = self.robot.acceleration
         both_directions = self.both_directions and self.noise > 0
-        self.left.change_speed(max_change, self._noise(self.left_chance, clock), both_directions)
-        self.right.change_speed(max_change, self._noise(self.right_chance, clock), both_directions)
+        self.left.change_speed(max_change, self._draw_noise(self.left_chance, clock), both_directions)
+        self.right.change_speed(max_change, self._draw_noise(self.right_chance, clock), both_directions)
         mm_per_degree = math.pi * self.robot.wheel_diameter / 360
         left = self.left.travel(clock) * mm_per_degree
         right = self.right.travel(clock) * mm_per_degree
@@ -140,7 +140,7 @@ class Drive:
         self.gyro_angle -= degrees
         self.gyro_rate = -degrees * 30
 
-    def _noise(self, chance: RandomStream | None, clock: int) -> float:
+    def _draw_noise(self, chance: RandomStream | None, clock: int) -> float:
         if self.noise <= 0 or chance is None:
             return 0.0
         return chance.between(-self.noise, self.noise, clock)

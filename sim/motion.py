@@ -80,7 +80,7 @@ class SolidMotion:
     """
 
     def __init__(self, robot: Robot, obstacles: tuple[Rectangle, ...], partner: Partner | None = None) -> None:
-        self._free = FreeMotion(robot)
+        self._free_motion = FreeMotion(robot)
         self._reach = robot.reach
         self._partner = partner
         self._boxes = (*build_walls().values(), *obstacles)
@@ -119,7 +119,7 @@ class SolidMotion:
 
     def compute_move(self, x: float, y: float, heading: float, left: float, right: float) -> tuple[float, float, float]:
         """Return the new x and y in mm and the turn in radians. Bullet is used only near walls and obstacles."""
-        new_x, new_y, rotation = self._free.compute_move(x, y, heading, left, right)
+        new_x, new_y, rotation = self._free_motion.compute_move(x, y, heading, left, right)
         contact_distance = self._reach + math.hypot(new_x - x, new_y - y)
         partner = self._partner
         if all(measure_gap(box, x, y) > contact_distance for box in self._boxes) and (

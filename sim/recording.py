@@ -161,7 +161,7 @@ class TimedText:
 
 
 class ProgramLine(NamedTuple):
-    """The program came to another line at a time in seconds.
+    """The moment, in seconds, when the program reached another line.
 
     ``line`` is the innermost line of its file, ``outer`` the line outside all functions that led there, or 0.
     """
@@ -181,7 +181,7 @@ LossReason = Literal["", "chance", "out of range", "facing away", "blocked"]
 class Message:
     """One text sent over the bridge.
 
-    ``t`` is the sending time; ``delivered`` is the arrival time, or None if the text was lost. ``reply`` is the
+    ``t`` is the sending time; ``delivered`` is the arrival time, or None if the text was lost. ``reply_to`` is the
     index of the answered text in the recording's messages. ``note`` lists effects of the channel: lost, duplicated,
     malformed.
 
@@ -211,7 +211,7 @@ class Message:
 class AgentMessage:
     """One text between the responder and an agent, or between two agents, during the answer to a robot's message.
 
-    ``message`` is the index of the robot's message, -1 while the responder is loaded. ``reply`` is the index of the
+    ``message`` is the index of the robot's message, -1 while the responder is loaded. ``reply_to`` is the index of the
     answered text in the recording's agent messages. For an unanswered question, ``note`` has the reason.
     """
 

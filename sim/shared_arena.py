@@ -34,7 +34,7 @@ class SharedArena(Arena):
         nearest = super().measure_distance(x, y, heading, forward)
         if self._partner.measure_gap(x, y) > nearest + forward:
             return nearest
-        return min(nearest, self._nearest_hit(x, y, heading, forward, _PARTNER))
+        return min(nearest, self._measure_nearest_hit(x, y, heading, forward, _PARTNER))
 
     def find_contacts(self, robot: Robot, x: float, y: float, heading: float) -> tuple[str, ...]:
         """Return the objects touched as in an arena, and the partner's name if the bodies touch."""

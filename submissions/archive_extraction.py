@@ -18,7 +18,7 @@ from submissions.raw_files import sanitise_name
 _DEEPEST = 20
 
 
-def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
+def unzip(path: Path, folder: Path, max_entries: int, max_bytes: int) -> None:
     """Extract a zip into a folder, as regular files and folders only.
 
     Raises:
@@ -26,8 +26,8 @@ def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
     """
     try:
         # The limit also counts folder entries and entries of stored archives.
-        with path.open("rb") as source, open_zip(source, 2 * most_entries) as archive:
-            _extract_into(archive, folder, path.name, most_entries, most_bytes)
+        with path.open("rb") as source, open_zip(source, 2 * max_entries) as archive:
+            _extract_into(archive, folder, path.name, max_entries, max_bytes)
     except FileExistsError as error:
         double = sanitise_name(str(Path(error.filename).relative_to(folder)))
         raise UsageError(f"{path.name}: holds two files of the same name, {double}.") from None
@@ -38,11 +38,11 @@ def unzip(path: Path, folder: Path, most_entries: int, most_bytes: int) -> None:
         raise UsageError(f"{path.name}: cannot be unpacked: {error.strerror} ({free_bytes >> 20} MB free).") from None
 
 
-def _extract_into(archive: ZipFile, folder: Path, name: str, most_entries: int, most_bytes: int) -> None:
-    remaining_bytes = most_bytes
+def _extract_into(archive: ZipFile, folder: Path, name: str, max_entries: int, max_bytes: int) -> None:
+    remaining_bytes = max_bytes
     infos = [info for info in archive.infolist() if not info.is_dir()]
-    if len(infos) > most_entries:
-        raise UsageError(f"{name}: holds {len(infos)} files, expected at most {most_entries}.")
+    if len(infos) > max_entries:
+        raise UsageError(f"{name}: holds {len(infos)} files, expected at most {max_entries}.")
     for info in infos:
         target = _resolve_target(folder, info.filename, name)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ def _extract_into(archive: ZipFile, folder: Path, name: str, most_entries: int, 
             for chunk in read_entry_chunks(archive, info):
                 remaining_bytes -= len(chunk)
                 if remaining_bytes < 0:
-                    raise UsageError(f"{name}: unpacks to more than {_format_amount(most_bytes)}.")
+                    raise UsageError(f"{name}: unpacks to more than {_format_amount(max_bytes)}.")
                 sink.write(chunk)
 
 

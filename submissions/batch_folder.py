@@ -24,15 +24,15 @@ from submissions.grading_request import GradingRequest
 from submissions.raw_files import read_paths, sanitise_name
 from submissions.roster import RosterRow, read_roster, resolve_file
 from submissions.student_identity import People, RejectedSubmission, Student
-from submissions.student_names import LONGEST_NAME, describe_look_alikes, find_look_alikes, normalise_name
+from submissions.student_names import MAX_NAME_LENGTH, describe_look_alikes, find_look_alikes, normalise_name
 from submissions.submission import Submission
 
 _log = logging.getLogger(__name__)
 _PARTS = {"robot.py", "program.py", "responder.py"}
-_MOST_ENTRIES = 50_000
-_MOST_BYTES = 4_000_000_000
+_MAX_ENTRIES = 50_000
+_MAX_BYTES = 4_000_000_000
 #: Limit on the unpacked size of a zip, relative to its size. Text compresses to 10-20 %, zeros to 0.1 %.
-_ALWAYS_BYTES, _MOST_TIMES = 50_000_000, 30
+_ALWAYS_BYTES, _MAX_TIMES = 50_000_000, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,8 +185,8 @@ def _build_request(
     student: Student,
 ) -> GradingRequest:
     length = len(normalise_name(student.id))
-    if not 0 < length <= LONGEST_NAME:
-        raise UsageError(f"has a student's name of {length} characters, expected from 1 to {LONGEST_NAME}.")
+    if not 0 < length <= MAX_NAME_LENGTH:
+        raise UsageError(f"has a student's name of {length} characters, expected from 1 to {MAX_NAME_LENGTH}.")
     submission, assignment = (
         _read_student_submission(download, folder, requested_assignment, student),
         requested_assignment,
@@ -263,7 +263,7 @@ def _opened(path: Path) -> Iterator[Path]:
             # The folder has the name of the zip, for use in messages and as the assignment's name.
             folder = Path(name) / (path.stem or "batch")
             folder.mkdir()
-            unzip(path, folder, _MOST_ENTRIES, min(_MOST_BYTES, _ALWAYS_BYTES + _MOST_TIMES * path.stat().st_size))
+            unzip(path, folder, _MAX_ENTRIES, min(_MAX_BYTES, _ALWAYS_BYTES + _MAX_TIMES * path.stat().st_size))
             yield _enter_only_folder(folder)
     elif not path.exists():
         raise UsageError(f"{path}: does not exist, expected a folder or a .zip of submissions, or a .csv roster.")

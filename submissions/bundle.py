@@ -23,7 +23,7 @@ from submissions.notebook import is_script, read_notebook, read_script
 from submissions.part_notes import PART_WORDS, build_missing_part_note, build_part_use_note
 from submissions.raw_files import RawFiles, read_folder, read_single_file, read_zip, sanitise_name
 from submissions.source_text import decode_source
-from submissions.student_names import LONGEST_NAME, normalise_name
+from submissions.student_names import MAX_NAME_LENGTH, normalise_name
 from submissions.submission import (
     META_FILE,
     PART_FILES,
@@ -294,7 +294,7 @@ def _assemble_submission(raw: RawFiles, source_name: str, name: str, candidate: 
         if decoded.note:
             notes.append(decoded.note)
     assignment = get_meta_text(meta, "assignment", source_name)
-    student = normalise_name(name)[:LONGEST_NAME].strip() or UNNAMED
+    student = normalise_name(name)[:MAX_NAME_LENGTH].strip() or UNNAMED
     meta_student = normalise_name(get_meta_text(meta, "student", source_name) or student)
     if meta_student != student:
         notes.append(

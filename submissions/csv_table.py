@@ -13,10 +13,10 @@ from sim.errors import UsageError
 from sim.readers.csv_text import CsvRecord, read_records
 from sim.readers.reader_errors import UnreadableDataError
 
-_MOST_BYTES = 10_000_000
+_MAX_BYTES = 10_000_000
 _SEPARATORS = (",", ";", "\t")
 #: Maximum number of lines of the header row.
-_LONGEST_HEADING = 20
+_MAX_HEADING_LENGTH = 20
 _QUOTES_PROBLEM = 'has quotation marks that do not match (one inside a cell is written "").'
 
 
@@ -68,11 +68,11 @@ def read_csv(path: Path, columns: Mapping[str, Sequence[str]], usual_columns: st
 def _read_text(path: Path) -> str:
     try:
         with path.open("rb") as stream:
-            data = stream.read(_MOST_BYTES + 1)
+            data = stream.read(_MAX_BYTES + 1)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}.") from None
-    if len(data) > _MOST_BYTES:
-        raise UsageError(f"{path.name}: is larger than {_MOST_BYTES // 10**6} MB, expected a list of students.")
+    if len(data) > _MAX_BYTES:
+        raise UsageError(f"{path.name}: is larger than {_MAX_BYTES // 10**6} MB, expected a list of students.")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -87,7 +87,7 @@ def _detect_separator(lines: Sequence[str], by_heading: Mapping[str, str]) -> st
     """Return the separator with which the first line contains most of the requested columns."""
 
     def found(separator: str) -> int:
-        cells = next(read_records(lines[:_LONGEST_HEADING], separator)).cells
+        cells = next(read_records(lines[:_MAX_HEADING_LENGTH], separator)).cells
         return sum(cell.strip().casefold() in by_heading for cell in cells)
 
     return max(_SEPARATORS, key=found)

@@ -15,9 +15,9 @@ from submissions.diagram_text import read_diagram
 from submissions.source_text import find_magic_line
 from submissions.submission import Notebook
 
-MOST_DIAGRAMS = 20
+MAX_DIAGRAMS = 20
 #: Limit for all diagrams of a notebook: six times the course's largest notebook. Drawing a part takes about 15 ms.
-MOST_PARTS = 240
+MAX_PARTS = 240
 _MAGIC = re.compile(r"%%(?P<kind>blockdiag|seqdiag)\b")
 
 
@@ -38,11 +38,11 @@ class NotebookDiagrams:
 
 
 def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
-    """Read the first ``MOST_DIAGRAMS`` diagrams of a notebook; without a notebook there are none.
+    """Read the first ``MAX_DIAGRAMS`` diagrams of a notebook; without a notebook there are none.
 
-    A diagram is omitted if it exceeds ``MOST_PARTS`` together with the earlier ones.
+    A diagram is omitted if it exceeds ``MAX_PARTS`` together with the earlier ones.
     """
-    remaining_parts = MOST_PARTS
+    remaining_parts = MAX_PARTS
     diagram_cells: list[DiagramCell] = []
     problems: list[str] = []
     for cell in notebook.cells if notebook is not None else ():
@@ -51,8 +51,8 @@ def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
         magic = _MAGIC.match(lines[magic_line].lstrip("\ufeff").strip()) if magic_line is not None else None
         if magic_line is None or magic is None:
             continue
-        if len(diagram_cells) + len(problems) == MOST_DIAGRAMS:
-            problems.append(f"cell {cell.number}: of all diagrams only the first {MOST_DIAGRAMS} are drawn")
+        if len(diagram_cells) + len(problems) == MAX_DIAGRAMS:
+            problems.append(f"cell {cell.number}: of all diagrams only the first {MAX_DIAGRAMS} are drawn")
             break
         kind = cast(DiagramKind, magic["kind"])
         try:
@@ -62,7 +62,7 @@ def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
             continue
         if diagram.parts > remaining_parts:
             problems.append(
-                f"cell {cell.number}: all diagrams together have more than {MOST_PARTS} actors, steps and texts; "
+                f"cell {cell.number}: all diagrams together have more than {MAX_PARTS} actors, steps and texts; "
                 "this one is not drawn"
             )
             continue

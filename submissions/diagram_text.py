@@ -30,7 +30,7 @@ MAX_ACTORS = 16
 MAX_STEPS = 80
 MAX_GROUPS = 8
 MAX_DEPTH = 8
-LONGEST_NAME = 80
+MAX_NAME_LENGTH = 80
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{3}(?:[0-9A-Fa-f]{3})?|[A-Za-z]{3,30}")
 
@@ -52,7 +52,7 @@ class _DiagramParser:
     def __init__(self, kind: DiagramKind, tokens: Sequence[DiagramToken], first_line: int) -> None:
         self._kind = kind
         self._tokens = tokens
-        self._place = 0
+        self._position = 0
         self._last_line = tokens[-1].line if tokens else first_line
         self._actors: dict[str, Attributes] = {}
         self._steps: list[DiagramArrow | Divider] = []
@@ -62,11 +62,11 @@ class _DiagramParser:
 
     def diagram(self) -> Diagram:
         """Parse the whole text, with or without a frame such as ``seqdiag { }``."""
-        framed = self._enter_frame()
+        has_frame = self._enter_frame()
         self._parse_statements(0)
-        if framed:
+        if has_frame:
             self._expect("}")
-        if self._place < len(self._tokens):
+        if self._position < len(self._tokens):
             raise self._build_unexpected_error("the end of the text")
         if not self._actors:
             raise build_error(self._last_line, "there is nothing to draw, expected lines like a -> b;")
@@ -83,36 +83,36 @@ class _DiagramParser:
         for length in (1, 2, 3):
             has_kind = length == 1 or words[:1] in (["diagram"], [self._kind])
             if words[length - 1 : length] == ["{"] and has_kind:
-                self._place = length
+                self._position = length
                 return True
         return False
 
     # Tokens.
 
     def _peek_token(self) -> DiagramToken | None:
-        return self._tokens[self._place] if self._place < len(self._tokens) else None
+        return self._tokens[self._position] if self._position < len(self._tokens) else None
 
     def _is_sign(self, sign: str, lookahead: int = 0) -> bool:
-        position = self._place + lookahead
+        position = self._position + lookahead
         if position >= len(self._tokens):
             return False
         token = self._tokens[position]
         return token.text == sign and token.kind == "sign"
 
-    def _take(self, sign: str) -> bool:
+    def _accept_sign(self, sign: str) -> bool:
         is_present = self._is_sign(sign)
-        self._place += is_present
+        self._position += is_present
         return is_present
 
     def _expect(self, sign: str) -> None:
-        if not self._take(sign):
+        if not self._accept_sign(sign):
             raise self._build_unexpected_error(sign)
 
     def _take_word(self, expected: str) -> str:
         token = self._peek_token()
         if token is None or token.kind not in ("name", "text"):
             raise self._build_unexpected_error(expected)
-        self._place += 1
+        self._position += 1
         return token.text
 
     def _build_unexpected_error(self, expected: str) -> UsageError:
@@ -121,45 +121,47 @@ class _DiagramParser:
             return build_error(self._last_line, f"the text ends here, expected {expected}")
         return build_error(token.line, f"{token.text[:40]!r} stands here, expected {expected}")
 
-    def _line(self) -> int:
+    def _get_last_line(self) -> int:
         """Return the line of the last token."""
-        return self._tokens[max(0, self._place - 1)].line if self._tokens else self._last_line
+        return self._tokens[max(0, self._position - 1)].line if self._tokens else self._last_line
 
     # Statements.
 
     def _parse_statements(self, depth: int) -> None:
         self._check_depth(depth)
         while (token := self._peek_token()) is not None and not self._is_sign("}"):
-            if self._take(";"):
+            if self._accept_sign(";"):
                 continue
             if token.kind == "divider":
-                self._place += 1
+                self._position += 1
                 self._parse_divider(token)
             elif token.kind == "name" and token.text in ("class", "plugin") and not self._is_sign("=", 1):
-                self._place += 1
+                self._position += 1
                 self._parse_class(token.text)
-            elif self._begins_group():
+            elif self._is_at_group():
                 self._parse_group(depth)
-            elif token.text in FRAGMENTS and self._begins_braces():
+            elif token.text in FRAGMENTS and self._is_before_braces():
                 self._parse_fragment(depth)
             elif self._is_sign("=", 1):
                 self._parse_setting()
             else:
                 self._parse_actors_or_arrows(depth)
 
-    def _begins_group(self) -> bool:
+    def _is_at_group(self) -> bool:
         token = self._peek_token()
-        return token is not None and token.text == "group" and self._begins_braces()
+        return token is not None and token.text == "group" and self._is_before_braces()
 
-    def _begins_braces(self) -> bool:
+    def _is_before_braces(self) -> bool:
         """Return whether the keyword is followed by braces, with an optional name between them."""
         return self._is_sign("{", 1) or (
-            self._is_sign("{", 2) and self._tokens[self._place + 1].kind in ("name", "text")
+            self._is_sign("{", 2) and self._tokens[self._position + 1].kind in ("name", "text")
         )
 
     def _check_depth(self, depth: int) -> None:
         if depth > MAX_DEPTH:
-            raise build_error(self._line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them")
+            raise build_error(
+                self._get_last_line(), f"braces are nested too deeply, expected at most {MAX_DEPTH} of them"
+            )
 
     def _parse_divider(self, token: DiagramToken) -> None:
         if self._kind != "seqdiag":
@@ -196,10 +198,10 @@ class _DiagramParser:
         attributes: Attributes = {}
         members: list[str] = []
         self._expect("{")
-        while not self._take("}"):
-            if self._take(";"):
+        while not self._accept_sign("}"):
+            if self._accept_sign(";"):
                 continue
-            if self._begins_group():
+            if self._is_at_group():
                 members += self._parse_group(depth + 1)
             elif self._is_sign("=", 1):
                 name, value = self._parse_assignment(GROUP_ATTRIBUTES, "a group")
@@ -207,7 +209,7 @@ class _DiagramParser:
             else:
                 members += self._parse_actors_or_arrows(depth)
         if len(self._groups) >= MAX_GROUPS:
-            raise build_error(self._line(), f"there are too many groups, expected at most {MAX_GROUPS}")
+            raise build_error(self._get_last_line(), f"there are too many groups, expected at most {MAX_GROUPS}")
         colour = _clean_colour(attributes.get("color", self._settings.get("default_group_color", "")))
         self._groups.append(ActorGroup(attributes.get("label", label), tuple(dict.fromkeys(members)), colour))
         return members
@@ -219,7 +221,7 @@ class _DiagramParser:
         while (token := self._peek_token()) is not None and token.kind == "arrow":
             if token.text not in ARROWS[self._kind]:
                 raise self._build_unexpected_error(f"one of {' '.join(ARROWS[self._kind])}")
-            self._place += 1
+            self._position += 1
             signs.append(token)
             chain.append(self._parse_names())
         if signs:
@@ -276,27 +278,28 @@ class _DiagramParser:
     def _parse_names(self) -> list[str]:
         """Parse one or more actors separated by commas, and add them to the diagram."""
         names = [self._parse_name()]
-        while self._take(","):
+        while self._accept_sign(","):
             names.append(self._parse_name())
         return names
 
     def _parse_name(self) -> str:
         name = self._take_word("the name of an actor")
-        if not name.strip() or len(name) > LONGEST_NAME:
+        if not name.strip() or len(name) > MAX_NAME_LENGTH:
             raise build_error(
-                self._line(), f"an actor's name is empty or too long, expected 1 to {LONGEST_NAME} characters"
+                self._get_last_line(),
+                f"an actor's name is empty or too long, expected 1 to {MAX_NAME_LENGTH} characters",
             )
         self._actors.setdefault(name, {})
         if len(self._actors) > MAX_ACTORS:
-            raise build_error(self._line(), f"there are too many actors, expected at most {MAX_ACTORS}")
+            raise build_error(self._get_last_line(), f"there are too many actors, expected at most {MAX_ACTORS}")
         return name
 
     def _parse_attributes(self, known_names: frozenset[str] | None, owner: str) -> Attributes:
         """Parse ``[label = "x", failed]`` any number of times, and replace a class by its attributes."""
         attributes: Attributes = {}
-        while self._take("["):
-            while not self._take("]"):
-                if self._take(",") or self._take(";"):
+        while self._accept_sign("["):
+            while not self._accept_sign("]"):
+                if self._accept_sign(",") or self._accept_sign(";"):
                     continue
                 if self._is_sign("=", 1):
                     name, value = self._parse_assignment(known_names, owner)
@@ -314,18 +317,18 @@ class _DiagramParser:
         if known_names is None or name in known_names:
             return name
         raise build_error(
-            self._line(),
+            self._get_last_line(),
             f"{name[:40]!r} is not an attribute of {owner}{suggest_word(name, known_names, 'label or color')}",
         )
 
     def _check_shape(self, shape: str) -> None:
         if shape not in SHAPES:
             expected = suggest_word(shape, SHAPES, "box, ellipse or diamond")
-            raise build_error(self._line(), f"there is no shape {shape[:40]!r}{expected}")
+            raise build_error(self._get_last_line(), f"there is no shape {shape[:40]!r}{expected}")
 
     def _add(self, step: DiagramArrow | Divider) -> None:
         if len(self._steps) >= MAX_STEPS:
-            raise build_error(self._line(), f"there are too many arrows, expected at most {MAX_STEPS}")
+            raise build_error(self._get_last_line(), f"there are too many arrows, expected at most {MAX_STEPS}")
         self._steps.append(step)
 
     def _build_actor(self, name: str, attributes: Attributes) -> DiagramActor:

@@ -51,7 +51,7 @@ _COMPILED = (".pyc", ".pyo", ".pyd", ".so", ".egg", ".whl")
 _MODULES = (".py", *_COMPILED)
 _ELF = b"\x7fELF"
 #: Maximum number of archive entries read, because zipfile creates an object for each.
-_MOST_ENTRIES = 2000
+_MAX_ENTRIES = 2000
 
 
 def advise_on_kind(names: Iterable[str]) -> Sentence | None:
@@ -97,7 +97,7 @@ def _has_modules(data: bytes) -> bool:
     if not is_zip(BytesIO(data)):
         return False
     try:
-        with open_zip(BytesIO(data), _MOST_ENTRIES) as archive:
+        with open_zip(BytesIO(data), _MAX_ENTRIES) as archive:
             return any(entry.lower().endswith(_MODULES) for entry in archive.namelist())
     except UnreadableDataError:
         return True

@@ -10,7 +10,7 @@ from typing import Any
 
 from sim.errors import UsageError
 from sim.readers.reader_errors import UnreadableDataError
-from sim.readers.yaml_text import MOST_BYTES, read_yaml
+from sim.readers.yaml_text import MAX_BYTES, read_yaml
 
 
 def read_gradescope_list(path: Path) -> dict[str, Any]:
@@ -21,7 +21,7 @@ def read_gradescope_list(path: Path) -> dict[str, Any]:
     """
     try:
         with path.open("rb") as stream:
-            submissions = read_yaml(stream.read(MOST_BYTES + 1))
+            submissions = read_yaml(stream.read(MAX_BYTES + 1))
     except OSError as error:
         raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
     except UnreadableDataError as error:

@@ -17,8 +17,8 @@ from sim.robot import WIDENED, get_default_robot_name
 from submissions.source_text import PREAMBLES, Preamble, find_magic_line
 from submissions.suggestions import suggest_name
 
-_X_MOST, _Y_MOST, _ANGLE_MOST = 2362, 1143, 360
-_LIGHT_NOISE_MOST, _MOTOR_NOISE_MOST = 128, 500
+_MAX_X, _MAX_Y, _MAX_ANGLE = 2362, 1143, 360
+_MAX_LIGHT_NOISE, _MAX_MOTOR_NOISE = 128, 500
 _PEN_COLOURS = ("red", "orange", "green")
 
 #: Pose of the robot in a new simulator, and after a robot is chosen.
@@ -239,7 +239,7 @@ class SimulatorPage:
 
     def __init__(self) -> None:
         self.background = "Empty_Map"
-        self.robot = self._chosen = "Default_Robot"
+        self.robot = self._chosen_robot = "Default_Robot"
         self.obstacles: tuple[tuple[float, float, float, float], ...] = ()
         self.pose = _FRESH_POSE
         self._angle_slider = 0
@@ -289,7 +289,7 @@ class SimulatorPage:
             hint = suggest_name(name[:40], WIDENED)
             self._add_note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{hint}")
             name = "Default_Robot"
-        self.robot = self._chosen = name
+        self.robot = self._chosen_robot = name
         self.pose = _AFTER_ROBOT
         self._noise = {"N": 0.0, "M": 0.0}
         self._noise_is_heard = True
@@ -301,13 +301,13 @@ class SimulatorPage:
             name = "Empty_Map"
         self.background = name
         self.pose, self.obstacles = get_floor_start(name)
-        if 0 <= self.pose.heading <= _ANGLE_MOST:
+        if 0 <= self.pose.heading <= _MAX_ANGLE:
             self._angle_slider = round(self.pose.heading)
         # The original keeps this change of the robot for the rest of the session; here it ends with the background.
-        self.robot = self._chosen
+        self.robot = self._chosen_robot
         if get_default_robot_name(name) == WIDENED["Default_Robot"]:
             self._add_note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
-            self.robot = WIDENED[self._chosen]
+            self.robot = WIDENED[self._chosen_robot]
             self._noise = {"N": 0.0, "M": 0.0}
             self._noise_is_heard = False
 
@@ -360,8 +360,8 @@ class SimulatorPage:
         """
         if angle is not None:
             self._angle_slider = angle
-        x = _to_slider_value(self.pose.x, _X_MOST) if x is None else x
-        y = _to_slider_value(self.pose.y, _Y_MOST) if y is None else y
+        x = _to_slider_value(self.pose.x, _MAX_X) if x is None else x
+        y = _to_slider_value(self.pose.y, _MAX_Y) if y is None else y
         if angle is None and self.pose.heading != self._angle_slider:
             self._add_note(f"setting the position turns the robot to {self._angle_slider} degrees; add -a to choose")
         self.pose = Pose(x, y, self._angle_slider)
@@ -371,7 +371,7 @@ class SimulatorPage:
             self._notes.append(text)
 
 
-_SLIDERS = {"x": _X_MOST, "y": _Y_MOST, "a": _ANGLE_MOST, "N": _LIGHT_NOISE_MOST, "M": _MOTOR_NOISE_MOST}
+_SLIDERS = {"x": _MAX_X, "y": _MAX_Y, "a": _MAX_ANGLE, "N": _MAX_LIGHT_NOISE, "M": _MAX_MOTOR_NOISE}
 
 
 def _to_slider_value(value: float, maximum: int) -> int:

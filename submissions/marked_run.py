@@ -36,7 +36,7 @@ _CALL = re.compile(r"""\.run_cell_magic\([ \t]*['"]sim_magic""")
 _SENDS = ("PY::", "IMG_DATA")
 #: Maximum number of statements and characters of a sensor test.
 _TEST_STATEMENTS, _TEST_LENGTH = 2, 300
-_MOST_SHOWN = 5
+_MAX_LISTED_RUNS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,10 +197,10 @@ def _explain_choice(misfits: dict[ProgramRun, tuple[str, ...]], marked_run: Prog
     if len(misfits) < 2:
         return ()
     other_runs = [_describe_other_run(run, found) for run, found in misfits.items() if run != marked_run]
-    more_text = f" and {len(other_runs) - _MOST_SHOWN} more" if len(other_runs) > _MOST_SHOWN else ""
+    more_text = f" and {len(other_runs) - _MAX_LISTED_RUNS} more" if len(other_runs) > _MAX_LISTED_RUNS else ""
     return (
         f"that is run {marked_run.number} of {len(misfits)}, {reason}; the others are "
-        f"{', '.join(other_runs[:_MOST_SHOWN])}{more_text}",
+        f"{', '.join(other_runs[:_MAX_LISTED_RUNS])}{more_text}",
         "another run is marked with --run NUMBER, or with run = NUMBER in submission.toml",
     )
 

@@ -34,7 +34,7 @@ NEARLY_MAGIC = re.compile(r"[ \t\ufeff]*%*[ \t]?sim_?ma\w*(?:[ \t]+-|[ \t]*\r?$)
 #: Its percent signs and name, also with a space between them.
 _BEGIN = re.compile(r"%*[ \t]?sim_?ma\w*")
 _RESPONDER = re.compile(r"^def (?:\w+_)?responder\([^\n]{0,100}", re.MULTILINE)
-_MOST_RAW = 3
+_MAX_RAW_RESPONDERS = 3
 _MARKER = re.compile(r"^#[ \t]*In[ \t]*\[[ \t\d*]*\]:?[ \t]*$")
 _CELL_MAGIC_CALL = re.compile(r"^get_ipython\(\)\.run_cell_magic\(")
 
@@ -73,7 +73,7 @@ def read_notebook(data: bytes, name: str) -> LoadedNotebook:
             markdown.append(position)
         elif raw["cell_type"] == "raw":
             responders += _RESPONDER.findall(source)
-    notebook = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MOST_RAW]))
+    notebook = Notebook(name, tuple(cells), tuple(markdown), tuple(responders[:_MAX_RAW_RESPONDERS]))
     return LoadedNotebook(_check_notebook(notebook), tuple(notes))
 
 
@@ -178,7 +178,7 @@ def _parse_document(text: str, name: str) -> Mapping[str, Any]:
     if not text.strip():
         raise UsageError("%(name)s: is an empty file, expected a notebook.", name=name)
     try:
-        document = read_json(text, most_values=_MAX_VALUES, strict=False)
+        document = read_json(text, max_values=_MAX_VALUES, strict=False)
     except TooManyValuesError:
         raise UsageError(
             "%(name)s: has too much output in it, expected a notebook whose outputs were cleared before it was saved.",

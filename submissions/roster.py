@@ -13,7 +13,7 @@ from sim.errors import UsageError
 from submissions.csv_table import CsvRow, read_csv
 from submissions.raw_files import sanitise_name
 from submissions.student_identity import PERSON_COLUMNS, UNKNOWN_STUDENT, Student
-from submissions.student_names import LONGEST_NAME, normalise_name
+from submissions.student_names import MAX_NAME_LENGTH, normalise_name
 
 _OWN_COLUMNS = ("file", "assignment", "submitted_at")
 _USUAL_COLUMNS = "student (or id), file, assignment"
@@ -100,6 +100,6 @@ def parse_time(text: str, *, end_of_day: bool = False) -> datetime:
 def _find_problem(student: str, file: str) -> str:
     if not student:
         return "has no student."
-    if len(student) > LONGEST_NAME:
-        return f"has a student's name of {len(student)} characters, expected at most {LONGEST_NAME}."
+    if len(student) > MAX_NAME_LENGTH:
+        return f"has a student's name of {len(student)} characters, expected at most {MAX_NAME_LENGTH}."
     return "" if file else "has no file."

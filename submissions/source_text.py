@@ -38,7 +38,7 @@ PREAMBLES: Mapping[str, Preamble] = MappingProxyType(
 _IMPORTING = re.compile(r"^.*import.*$", re.MULTILINE)
 _WORD = re.compile(r"[^\W\d]\w*")
 #: Limit on the modules of one program in characters, the same as for one file.
-_MOST_TEXT = 1 << 20
+_MAX_MODULES_LENGTH = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ def find_modules(text: str, read_file: Callable[[str], bytes | None]) -> Mapping
     """
     modules: dict[str, str] = {}
     checked_names: set[str] = set()
-    remaining_length = _MOST_TEXT
+    remaining_length = _MAX_MODULES_LENGTH
     pending_texts = [text]
     while pending_texts:
         for name in sorted(_find_imported_names(pending_texts.pop()) - checked_names):

@@ -13,7 +13,7 @@ from importlib import resources
 
 from submissions.raw_files import sanitise_name
 
-LONGEST_NAME = 100
+MAX_NAME_LENGTH = 100
 #: Joiners are control characters, but emoji and some scripts need them.
 _JOINERS = "\u200c\u200d"
 #: Letters and symbols that look like spaces.

@@ -26,7 +26,7 @@ PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "respo
 #: File name of the second robot's program, which is among the additional files.
 SECOND_PROGRAM = "robot2.py"
 META_FILE = "submission.toml"
-_MOST_META_BYTES = 64 * 1024
+_MAX_META_BYTES = 64 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +113,14 @@ class Submission:
         on them.
         """
         yield b"robomark submission 2\n"
-        for record in self._records():
+        for record in self._iterate_records():
             yield b"%d fields\n" % len(record)
             for part in record:
                 data = part if isinstance(part, bytes) else part.encode("utf-8", "surrogatepass")
                 yield b"%d bytes\n" % len(data)
                 yield data
 
-    def _records(self) -> Iterator[tuple[str | bytes, ...]]:
+    def _iterate_records(self) -> Iterator[tuple[str | bytes, ...]]:
         for part, source in (("program", self.program), ("responder", self.responder)):
             if source is not None:
                 yield part, source.name, source.text
@@ -151,7 +151,7 @@ def read_meta(data: bytes, source_name: str) -> dict[str, object]:
     """
     if not data:
         return {}
-    if len(data) > _MOST_META_BYTES:
+    if len(data) > _MAX_META_BYTES:
         raise UsageError("%(where)s: %(file)s is too large, expected a few lines.", where=source_name, file=META_FILE)
     return parse_meta(data, source_name)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-_LONGEST = 100
+_MAX_NAME_LENGTH = 100
 
 
 def suggest_name(name: str, known_names: Iterable[str]) -> str:
     """Return ``; did you mean "x"?`` for a similar name, otherwise an empty text."""
     # The time is proportional to the product of the lengths.
-    if len(name) > _LONGEST:
+    if len(name) > _MAX_NAME_LENGTH:
         return ""
     by_lower = {k.lower(): k for k in known_names}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)

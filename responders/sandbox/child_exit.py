@@ -15,7 +15,7 @@ from responders.sandbox.meter import ChildStopped
 from sim.errors import HostError
 from sim.recording import Verdict
 
-NOWHERE: wire.Frame = {"line": None, "file": None}
+UNKNOWN_LOCATION: wire.Frame = {"line": None, "file": None}
 _CLOSED_MESSAGE = "its process ended without finishing the program"
 
 
@@ -36,7 +36,7 @@ def explain_exit_status(status: int, used_seconds: float, cpu_seconds: float) ->
     number = os.WTERMSIG(status)
     # The kernel's limit on processor time, a second or two above ours, also ends with SIGKILL.
     if number == signal.SIGXCPU or (number == signal.SIGKILL and used_seconds > cpu_seconds):
-        return build_cpu_stop(cpu_seconds, NOWHERE)
+        return build_cpu_stop(cpu_seconds, UNKNOWN_LOCATION)
     if number == signal.SIGSYS:
         return ChildStopped(Verdict.SANDBOX_VIOLATION, "it used a system call that is not allowed")
     if number != signal.SIGKILL:
@@ -67,11 +67,11 @@ def explain_kill(has_ended: bool, has_overrun: bool, is_blamed: bool) -> ChildSt
     raise KilledFromOutside("something on this machine killed a student's process: is there enough memory?")
 
 
-def parse_place(unread_output: bytes) -> wire.Frame:
-    """Return the place that a child reports when asked, from its unread output."""
+def parse_location(unread_output: bytes) -> wire.Frame:
+    """Parse the location that a child reports on request, from its unread output."""
     for line in reversed(unread_output.split(b"\n")):
         # Packets may precede the frame.
         start = max(line.rfind(wire.LINE_START), 0)
         with contextlib.suppress(wire.WireError):
             return wire.parse_frame(wire.split_number(line[start:])[1], {"busy": wire.ROBOT["busy"]})
-    return NOWHERE
+    return UNKNOWN_LOCATION

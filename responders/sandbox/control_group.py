@@ -18,18 +18,18 @@ from sim.errors import HostError
 #: Group of the worker itself, because a group with subgroups may not contain processes.
 _SERVICE = "robomark-service"
 _SLOT = "robomark-slot-"
-_NEEDED = frozenset({"memory", "pids"})
-_WANTED = _NEEDED | {"io"}
+_REQUIRED_CONTROLLERS = frozenset({"memory", "pids"})
+_USED_CONTROLLERS = _REQUIRED_CONTROLLERS | {"io"}
 _MEGABYTE = 1 << 20
 #: Memory of zygotes, and of children beyond their limits.
 _EXTRA_MEMORY = 400 * _MEGABYTE
 #: A zygote for each role, some inside bubblewrap, and their children. None of them may start a thread.
-_MOST_PROCESSES = 32
+_MAX_PROCESSES = 32
 #: The default weight is 100.
 _DISK_WEIGHT = 10
 #: Limit on disk writes, bytes per second. Honest students write a few kilobytes.
-_WRITTEN_A_SECOND = 32 * _MEGABYTE
-_WRITES_A_SECOND = 500
+_MAX_WRITTEN_BYTES_PER_SECOND = 32 * _MEGABYTE
+_MAX_WRITES_PER_SECOND = 500
 _END_SECONDS = 2.0
 _PROC = Path("/proc")
 
@@ -51,7 +51,7 @@ def divide_group(proc: Path = _PROC) -> str | None:
     try:
         service.mkdir(exist_ok=True)
         (service / "cgroup.procs").write_text("0")
-        controllers = _WANTED & set((group / "cgroup.controllers").read_text().split())
+        controllers = _USED_CONTROLLERS & set((group / "cgroup.controllers").read_text().split())
         (group / "cgroup.subtree_control").write_text(" ".join(f"+{name}" for name in sorted(controllers)))
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -83,19 +83,19 @@ class ControlGroup:
             HostError: If it can't be created.
         """
         self._folder = folder
-        self._least = memory_mb * _MEGABYTE
-        _remove_left_overs(folder.parent)
+        self._base_memory_bytes = memory_mb * _MEGABYTE
+        _remove_stale_groups(folder.parent)
         try:
             folder.mkdir(exist_ok=True)
-            self._write_setting("memory.max", self._least)
-            self._write_setting("pids.max", _MOST_PROCESSES)
+            self._write_setting("memory.max", self._base_memory_bytes)
+            self._write_setting("pids.max", _MAX_PROCESSES)
         except OSError as error:
             raise HostError(f"the control group {folder} cannot be made: {error.strerror}") from None
         disk = _find_disk_number(Path(tempfile.gettempdir()))
         for file, value in (
             ("memory.swap.max", "0"),
             ("io.weight", f"default {_DISK_WEIGHT}"),
-            ("io.max", f"{disk} wbps={_WRITTEN_A_SECOND} wiops={_WRITES_A_SECOND}"),
+            ("io.max", f"{disk} wbps={_MAX_WRITTEN_BYTES_PER_SECOND} wiops={_MAX_WRITES_PER_SECOND}"),
         ):
             # Not supported by all kernels and disks.
             with contextlib.suppress(OSError):
@@ -109,7 +109,7 @@ class ControlGroup:
     def adjust_memory_limit(self, limits_bytes: int) -> None:
         """Set the group's limit so that its processes can have the memory that an assignment allows them together."""
         try:
-            self._write_setting("memory.max", max(self._least, limits_bytes + _EXTRA_MEMORY))
+            self._write_setting("memory.max", max(self._base_memory_bytes, limits_bytes + _EXTRA_MEMORY))
         except OSError as error:
             raise HostError(f"the control group {self._folder} cannot be changed: {error.strerror}") from None
 
@@ -147,7 +147,7 @@ class ControlGroup:
 
 
 def create_slot_group(memory_mb: int, proc: Path = _PROC) -> ControlGroup | None:
-    """Return the group of this process's slot if the worker could ``divide`` its own, otherwise None.
+    """Create the group of this process's slot. Return None unless the worker's own group was divided before.
 
     Raises:
         HostError: If the group can't be created.
@@ -170,7 +170,7 @@ def _locate_delegated_group(proc: Path) -> Path:
     own_group = _locate_own_group(proc)
     group = own_group.parent if own_group.name == _SERVICE else own_group
     try:
-        missing_controllers = _NEEDED - set((group / "cgroup.controllers").read_text().split())
+        missing_controllers = _REQUIRED_CONTROLLERS - set((group / "cgroup.controllers").read_text().split())
         processes = (own_group / "cgroup.procs").read_text().split()
     except OSError as error:
         raise _NotDelegated(f"{own_group} cannot be read: {error.strerror}") from None
@@ -206,7 +206,7 @@ def _locate_own_group(proc: Path) -> Path:
     raise _NotDelegated("control groups of version 2 are not mounted")
 
 
-def _remove_left_overs(group: Path) -> None:
+def _remove_stale_groups(group: Path) -> None:
     """Remove the groups of slots whose process was killed before it could remove them."""
     for folder in group.glob(f"{_SLOT}*"):
         if not Path(f"/proc/{folder.name.removeprefix(_SLOT)}").exists():

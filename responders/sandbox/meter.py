@@ -53,13 +53,13 @@ class JobMeter:
     def __init__(self, limits: JobLimits = JobLimits(), heartbeat: Callable[[], None] = lambda: None) -> None:
         self._limits = limits
         self._heartbeat = heartbeat
-        self._kept = 0
+        self._kept_bytes = 0
         self._cpu = self._sleep = 0.0  # of ended children
 
     @property
     def spent(self) -> JobCosts:
         """The costs of the job so far. Seconds include only ended children."""
-        return JobCosts(self._kept, self._cpu, self._sleep)
+        return JobCosts(self._kept_bytes, self._cpu, self._sleep)
 
     @property
     def limits(self) -> JobLimits:
@@ -85,8 +85,8 @@ class JobMeter:
         Raises:
             ChildStopped: If the job exceeds its limit.
         """
-        self._kept += size + OBJECT_BYTES
-        if self._kept > self._limits.kept_bytes:
+        self._kept_bytes += size + OBJECT_BYTES
+        if self._kept_bytes > self._limits.kept_bytes:
             raise ChildStopped(
                 Verdict.OUTPUT_LIMIT,
                 f"all trials together said more than {self._limits.kept_bytes >> 20} MB, counting messages and images",
@@ -127,7 +127,7 @@ class JobMeter:
 
     def refund_since(self, earlier_costs: JobCosts) -> None:
         """Refund the costs since ``earlier_costs``, because the host caused the failure."""
-        self._kept, self._cpu, self._sleep = (
+        self._kept_bytes, self._cpu, self._sleep = (
             earlier_costs.kept_bytes,
             earlier_costs.cpu_seconds,
             earlier_costs.sleep_seconds,

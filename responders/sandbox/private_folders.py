@@ -120,7 +120,7 @@ def create_locked_folder(prefix: str, mode: int, path: Path | None = None) -> tu
     return path, lock
 
 
-def remove_left_overs(prefix: str = _PREFIX) -> None:
+def remove_stale_folders(prefix: str = _PREFIX) -> None:
     """Remove the locked folders whose process was killed before it could remove them.
 
     The process may be in another namespace, where process ids mean nothing. So a released lock is the only criterion.

@@ -39,7 +39,7 @@ _UNREAD_BYTES = 1 << 20
 _END_SECONDS = 1.0
 #: Frames that programs repeat thousands of times; each distinct one is validated once.
 _REPEATED_FRAMES = frozenset({"motor_state", "until"})
-_MOST_KNOWN, _LONGEST_KNOWN = 100, 200
+_MAX_CACHED_FRAMES, _MAX_CACHED_LENGTH = 100, 200
 #: Space in a responder's folder, in addition to the given files.
 _FOLDER_BYTES = 16 << 20
 _FOLDER_FILES = 256
@@ -107,29 +107,29 @@ class Child:
         self.sandbox = ""
         self._reap = reap
         self._folder = folder
-        self._given = (0, 0) if folder is None else process_state.measure_folder(folder, _MAX_GIVEN_FILES)
+        self._initial_folder_size = (0, 0) if folder is None else process_state.measure_folder(folder, _MAX_GIVEN_FILES)
         self._pid = pid
         self._pidfd = pidfd
         # A round trip over pipes costs little more than half of one over a socket.
         self._reading, self._writing = ends
-        self._answered = select.poll()
-        self._answered.register(self._reading, select.POLLIN)
+        self._reply_poll = select.poll()
+        self._reply_poll.register(self._reading, select.POLLIN)
         os.set_blocking(self._writing, False)
         self._limits = limits
         self._meter = JobMeter()
-        self._blamed = self._has_libraries = False
-        self._overran: Callable[[], bool] | None = None
+        self._is_blamed = self._has_libraries = False
+        self._has_overrun: Callable[[], bool] | None = None
         #: ``measured``: the child is watched beyond its limits, which still end it. ``outlasted``: it reached twice its
         #: limit.
         self.measured = self.outlasted = False
         self._pending = b""
         self._sent = self._received = 0  # frames
-        self._charged = 0.0  # seconds, for frames and actions in packets
-        self._known: dict[bytes, wire.Frame] = {}
+        self._charged_seconds = 0.0  # seconds, for frames and actions in packets
+        self._parsed_frames: dict[bytes, wire.Frame] = {}
         self._closed = False
         self._clock = (~pid << 3) | 2  # the CPU clock of another process, see clock_getcpuclockid(3)
         self._checked = 0.0
-        self._waited = 0.0  # real seconds in which the worker only waited for the child
+        self._waited_seconds = 0.0  # real seconds in which the worker only waited for the child
         self._queued_before = process_state.read_queued_seconds()
 
     def begin(
@@ -143,7 +143,12 @@ class Child:
             has_libraries: Libraries are loaded. Otherwise the child may ask for them.
             has_overrun: Returns whether the processes of the submission together exceeded their memory limit.
         """
-        self._meter, self._blamed, self._has_libraries, self._overran = meter, is_blamed, has_libraries, has_overrun
+        self._meter, self._is_blamed, self._has_libraries, self._has_overrun = (
+            meter,
+            is_blamed,
+            has_libraries,
+            has_overrun,
+        )
 
     def send(self, frame: dict[str, Any], entries: Sequence[str] = ()) -> None:
         """Send one frame. ``entries`` holds JSON texts. Write errors appear at the next ``receive``."""
@@ -155,7 +160,7 @@ class Child:
 
     def _send_bytes(self, frame: bytes) -> None:
         self._sent += 1
-        self._charged += _FRAME_CPU_SECONDS
+        self._charged_seconds += _FRAME_CPU_SECONDS
         try:
             frame = frame[os.write(self._writing, frame) :]
         except BlockingIOError:
@@ -178,7 +183,7 @@ class Child:
                     raise self._build_stall_stop() from None
             except OSError:
                 return
-        self._waited += time.monotonic() - start
+        self._waited_seconds += time.monotonic() - start
 
     def receive(self, schema: wire.Schema) -> wire.Frame:
         """Return the next frame, charged to the meter if any of its text may be stored.
@@ -194,8 +199,8 @@ class Child:
             line, self._pending = self._read_line(data)
             number, line = wire.split_number(line)
             self._check_number(number)
-            self._charged += len(line) * _BYTE_CPU_SECONDS
-            frame = self._known.get(line)
+            self._charged_seconds += len(line) * _BYTE_CPU_SECONDS
+            frame = self._parsed_frames.get(line)
             if frame is not None:
                 return frame
             frame = wire.parse_frame(line, schema)
@@ -213,8 +218,12 @@ class Child:
             raise LibrariesNeeded("student code imports a library at run time")
         if frame["do"] not in wire.UNCHARGED_FRAMES:
             self._meter.charge_bytes(len(line))
-        elif frame["do"] in _REPEATED_FRAMES and len(self._known) < _MOST_KNOWN and len(line) <= _LONGEST_KNOWN:
-            self._known[line] = frame
+        elif (
+            frame["do"] in _REPEATED_FRAMES
+            and len(self._parsed_frames) < _MAX_CACHED_FRAMES
+            and len(line) <= _MAX_CACHED_LENGTH
+        ):
+            self._parsed_frames[line] = frame
         return frame
 
     def _read_actions(self, data: bytes) -> list[packets.Action]:
@@ -227,7 +236,7 @@ class Child:
         self._pending = data[size:]
         actions = packets.unpack_actions(data[:size])
         self._check_number(number)
-        self._charged += len(actions) * _ACT_CPU_SECONDS
+        self._charged_seconds += len(actions) * _ACT_CPU_SECONDS
         return actions
 
     def _read_at_least(self, data: bytes, size: int) -> bytes:
@@ -243,7 +252,7 @@ class Child:
         if number != self._received:
             raise wire.WireError(f"frame {number} where frame {self._received} was due")
         self._received += 1
-        self._charged += _FRAME_CPU_SECONDS
+        self._charged_seconds += _FRAME_CPU_SECONDS
 
     @property
     def cpu_limit(self) -> float:
@@ -292,9 +301,9 @@ class Child:
         """Return the next bytes from the child, at least one."""
         last_cpu, idle_start = -1.0, time.monotonic()
         wait_start = idle_start
-        while not self._answered.poll(_POLL_SECONDS * 1000):
+        while not self._reply_poll.poll(_POLL_SECONDS * 1000):
             now = time.monotonic()
-            self._waited += now - wait_start
+            self._waited_seconds += now - wait_start
             wait_start = now
             self._meter.heartbeat()
             cpu_seconds = self._check_cpu()
@@ -306,7 +315,7 @@ class Child:
                     self._watch_beyond_limit(is_computing=False)
                 raise self._build_stall_stop()
         now = time.monotonic()
-        self._waited += now - wait_start
+        self._waited_seconds += now - wait_start
         data = os.read(self._reading, _READ_BYTES)
         if not data:
             raise self._explain_end()
@@ -325,7 +334,7 @@ class Child:
         """
         self._check_folder()
         cpu_seconds = self.measure_cpu_seconds()
-        charged_seconds = max(cpu_seconds, self._charged)
+        charged_seconds = max(cpu_seconds, self._charged_seconds)
         if charged_seconds > self._limits.cpu_seconds:
             if self.measured:
                 self._watch_beyond_limit(is_computing=True)
@@ -337,7 +346,7 @@ class Child:
         """Check whether a child at its limit continues without output up to twice the limit, computing or asleep."""
         cpu_seconds, idle_start = self.measure_cpu_seconds(), time.monotonic()
         with contextlib.suppress(ChildStopped):
-            while not self._answered.poll(_POLL_SECONDS * 1000):
+            while not self._reply_poll.poll(_POLL_SECONDS * 1000):
                 self._meter.heartbeat()
                 self._check_folder()
                 last_cpu, cpu_seconds = cpu_seconds, self.measure_cpu_seconds()
@@ -366,7 +375,7 @@ class Child:
     def _measure_sleep(self) -> float:
         return max(
             0.0,
-            self._waited
+            self._waited_seconds
             - process_state.read_busy_seconds(self._pid)
             - (process_state.read_queued_seconds() - self._queued_before),
         )
@@ -375,9 +384,12 @@ class Child:
         """Check the size of the folder. It is flat, because the sandbox allows neither subfolders nor links."""
         if self._folder is None:
             return
-        most_bytes, most_files = self._given[0] + _FOLDER_BYTES, self._given[1] + _FOLDER_FILES
-        size, count = process_state.measure_folder(self._folder, most_files + 1)
-        if size > most_bytes or count > most_files:
+        max_bytes, max_files = (
+            self._initial_folder_size[0] + _FOLDER_BYTES,
+            self._initial_folder_size[1] + _FOLDER_FILES,
+        )
+        size, count = process_state.measure_folder(self._folder, max_files + 1)
+        if size > max_bytes or count > max_files:
             raise ChildStopped(
                 Verdict.OUTPUT_LIMIT,
                 f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
@@ -393,12 +405,12 @@ class Child:
         while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < cpu_deadline:
             if time.monotonic() > deadline and not process_state.is_runnable(self._pid):
                 break
-            if self._answered.poll(_POLL_SECONDS * 1000):
+            if self._reply_poll.poll(_POLL_SECONDS * 1000):
                 new_data = os.read(self._reading, wire.MAX_FRAME_BYTES)
                 if not new_data:
                     break
                 data += new_data
-        return child_exit.parse_place(data)
+        return child_exit.parse_location(data)
 
     def _build_stall_stop(self) -> ChildStopped:
         return ChildStopped(
@@ -418,20 +430,20 @@ class Child:
         stop = child_exit.explain_exit_status(self._reap(), cpu_seconds, self._limits.cpu_seconds)
         if stop is not None:
             return stop
-        has_overrun = has_ended and self._overran is not None and self._overran()
-        return child_exit.explain_kill(has_ended, has_overrun, self._blamed)
+        has_overrun = has_ended and self._has_overrun is not None and self._has_overrun()
+        return child_exit.explain_kill(has_ended, has_overrun, self._is_blamed)
 
     def _has_ended(self) -> bool:
         """Return whether the child ends within a second: a dying process closes the wire a moment earlier."""
         start = time.monotonic()
         has_ended = bool(select.select([self._pidfd], [], [], _END_SECONDS)[0])
-        self._waited += time.monotonic() - start
+        self._waited_seconds += time.monotonic() - start
         return has_ended
 
     def _kill_and_charge(self) -> None:
         """Kill the child and report its costs to the meter."""
         self._closed = True
-        cpu_seconds, slept = max(self.measure_cpu_seconds(), self._charged), self._measure_sleep()
+        cpu_seconds, slept = max(self.measure_cpu_seconds(), self._charged_seconds), self._measure_sleep()
         if self.measured:
             # The extra time for measuring is not charged.
             cpu_seconds, slept = min(cpu_seconds, self._limits.cpu_seconds), min(slept, _STALLED_SECONDS)

@@ -37,12 +37,12 @@ from sim.errors import HostError
 ChildRole = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
 ChildWork = Literal["role", "battery"]
 
-_HERE = Path(__file__).resolve().parent
+_SANDBOX_FOLDER = Path(__file__).resolve().parent
 _START_SECONDS = 60.0
 _END_SECONDS = 0.5
 _FILE_BYTES = 4 << 20
 _RECYCLE_AFTER = 1000
-_MOST_PROCESSORS = 1024
+_MAX_PROCESSORS = 1024
 #: Report of an ended child: wait status, and user and system time as seconds and microseconds.
 _EXIT_REPORT = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
@@ -116,7 +116,7 @@ class Zygote:
     ) -> None:
         self._role = role
         self._group = group
-        self._without = exclusions
+        self._exclusions = exclusions
         self._sandbox = isolation
         self._folders = folders
         self._folders_inside = -1  # descriptor of the private folders' parent, opened inside the zygote
@@ -297,11 +297,13 @@ class Zygote:
         """
         if self._process is not None and self._process.poll() is None:
             return
-        compile_bytecode(_HERE / "inside")
+        compile_bytecode(_SANDBOX_FOLDER / "inside")
         compile_bytecode(Path(find_module_folder(self._role)))
         wrapping: list[str] = []
         if self._sandbox.bubblewrap:
-            wrapping = bubblewrap.build_command_prefix([str(_HERE), find_module_folder(self._role)], self._folders.path)
+            wrapping = bubblewrap.build_command_prefix(
+                [str(_SANDBOX_FOLDER), find_module_folder(self._role)], self._folders.path
+            )
             self.without_bubblewrap = bubblewrap.check_available(wrapping)
         self._start_process(wrapping if self.without_bubblewrap is None else [])
 
@@ -322,10 +324,10 @@ class Zygote:
         descriptors = [each.fileno() for each in zygote_ends]
         group_prefix = self._group.command_prefix if self._group is not None else []
         arguments = [
-            str(_HERE),
+            str(_SANDBOX_FOLDER),
             self._role,
             str(self._folders.path),
-            " ".join(self._without),
+            " ".join(self._exclusions),
             find_module_folder(self._role),
         ]
         try:
@@ -378,7 +380,7 @@ class Zygote:
 
 def _encode_processors(processors: Set[int]) -> str:
     """Return the processors as a bit mask of constant length, because the length of a spec affects addresses."""
-    return sum(1 << number for number in processors).to_bytes(_MOST_PROCESSORS // 8, "little").hex()
+    return sum(1 << number for number in processors).to_bytes(_MAX_PROCESSORS // 8, "little").hex()
 
 
 def _close_descriptors(*descriptors: int) -> None:

@@ -1,6 +1,6 @@
 """Statistics of assignments for the terminal: a sentence and two tables for each.
 
-``grading/statistics.py`` computes them.
+``grading/class_statistics.py`` computes them.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from service.grading.class_statistics import AssignmentStatistics
 
-_MOST_CAUSES = 5
+_MAX_CAUSES = 5
 #: Maximum number of students that a row names.
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 def build_statistics(statistics: Iterable[AssignmentStatistics]) -> Iterator[RenderableType]:
@@ -39,7 +39,7 @@ def build_statistics(statistics: Iterable[AssignmentStatistics]) -> Iterator[Ren
         yield criteria_table
         if assignment_statistics.causes:
             causes_table = create_table("most common causes", "students", "who", right=("students",))
-            for cause in assignment_statistics.causes[:_MOST_CAUSES]:
+            for cause in assignment_statistics.causes[:_MAX_CAUSES]:
                 causes_table.add_row(
                     to_one_line(cause.sentence), str(len(cause.students)), format_names(cause.students)
                 )
@@ -48,4 +48,4 @@ def build_statistics(statistics: Iterable[AssignmentStatistics]) -> Iterator[Ren
 
 def format_names(students: tuple[str, ...]) -> str:
     """Return the first student names, and dots if there are more."""
-    return ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
+    return ", ".join(students[:_MAX_NAMED]) + (" ..." if len(students) > _MAX_NAMED else "")

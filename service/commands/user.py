@@ -59,7 +59,7 @@ def link(who: PersonId, course: Course = DEFAULT_COURSE) -> None:
 def links(
     course: Course = DEFAULT_COURSE,
     days: Annotated[
-        int, typer.Option(min=1, max=sign_in_links.MOST_DAYS, help="Number of days until the links expire.")
+        int, typer.Option(min=1, max=sign_in_links.MAX_DAYS, help="Number of days until the links expire.")
     ] = sign_in_links.DAYS,
 ) -> None:
     """Print a new sign-in link for each student of a course. Earlier links expire."""

@@ -17,7 +17,7 @@ from sim.recording import Verdict
 if TYPE_CHECKING:
     from service.grading.grade import Grade
 
-_BINS, _MOST_BINS = 10, 15
+_BINS, _MAX_BINS = 10, 15
 _HUNDREDTH = Decimal("0.01")
 #: The default pass mark, as a fraction of all marks.
 PASS_SHARE = Decimal("0.4")
@@ -98,7 +98,7 @@ def compute_distribution(marks: Iterable[Decimal], max_marks: Decimal) -> tuple[
     """Return one bin per mark if there are few, otherwise ten, plus one for full marks. Empty if the maximum is 0."""
     if max_marks <= 0:
         return ()
-    is_few = max_marks == int(max_marks) and max_marks <= _MOST_BINS
+    is_few = max_marks == int(max_marks) and max_marks <= _MAX_BINS
     steps = int(max_marks) if is_few else _BINS
     counts = [0] * (steps + 1)
     for each in marks:

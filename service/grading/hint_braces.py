@@ -12,7 +12,7 @@ from service.grading.hint_clues import Clues
 
 _BRACES = re.compile(r"\{([A-Za-z_]\w*)[^{}\"']{0,40}\}")
 _PLAIN_TEXT = re.compile(r"""[bru]?["']""", re.IGNORECASE)
-_LONGEST = 60
+_MAX_TOKEN_LENGTH = 60
 
 
 def hint_about_braces(clues: Clues) -> Iterator[str]:
@@ -33,7 +33,7 @@ def hint_about_braces(clues: Clues) -> Iterator[str]:
                 braces = next((each for each, name in names_by_braces.items() if each in token and name in names), None)
                 if braces is None or not _PLAIN_TEXT.match(token) or "format" in statement.tokens:
                     continue
-                fixed_text = f"f{token}" if len(token) <= _LONGEST else "f before the first quote"
+                fixed_text = f"f{token}" if len(token) <= _MAX_TOKEN_LENGTH else "f before the first quote"
                 yield (
                     f"{listing.locate(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
                     f"and is not replaced by its value. Write {fixed_text}"

@@ -21,9 +21,9 @@ from submissions.raw_files import sanitise_name
 from submissions.source_text import find_magic_line, is_program_magic
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Part, Submission
 
-_MOST_LINES, _LONGEST_LINE = 5000, 300
-_MOST_TEXTS, LONGEST_TEXT = 400, 300
-_MOST_BESIDE = 20
+_MAX_LINES, _MAX_LINE_LENGTH = 5000, 300
+_MAX_TEXTS, MAX_TEXT_LENGTH = 400, 300
+_MAX_EXTRA_FILES = 20
 _QUEUE = re.compile("pyState")
 
 
@@ -70,7 +70,7 @@ class Clues:
         results: The results of the lost criteria.
         limit: Simulated time of the shortest visible scenario, in seconds.
         task: The description of the assignment.
-        beside: Python files submitted with the parts, including agents.
+        extra_listings: Python files submitted with the parts, including agents.
         marked_cell: The notebook cell whose robot program runs alone; None if the whole notebook runs.
         ignored_magic: Why its magic line is ignored.
         idle_responder: The first line of a Raw cell that contains a responder.
@@ -78,7 +78,7 @@ class Clues:
         definition: The assignment.
         practice: The results of visible criteria without marks, which show what the marked ones look at.
         shown: The visible trials.
-        by_trial: Their recordings, by the index of the trial in the grade.
+        recordings_by_trial: Their recordings, by the index of the trial in the grade.
     """
 
     listings: tuple[Listing, ...]
@@ -177,12 +177,12 @@ class Clues:
     @property
     def sent(self) -> tuple[str, ...]:
         """The distinct messages from robots."""
-        return self._messages("robot")
+        return self._collect_messages("robot")
 
     @property
     def answers(self) -> tuple[str, ...]:
         """The distinct answers of the responder."""
-        return self._messages("responder")
+        return self._collect_messages("responder")
 
     def list_texts(self, part: Part) -> Iterator[Listing]:
         """Return the texts that may contain the part."""
@@ -196,7 +196,7 @@ class Clues:
                 return listing.locate(line)
         return PART_FILES[part] if any(each.part == part for each in self.listings) else "the notebook"
 
-    def _messages(self, sender: str) -> tuple[str, ...]:
+    def _collect_messages(self, sender: str) -> tuple[str, ...]:
         return _collect_distinct_texts(
             message.text for recording in self.recordings for message in recording.messages if message.sender == sender
         )
@@ -261,21 +261,21 @@ def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
 
 
 def _build_extra_listings(submission: Submission) -> Iterator[Listing]:
-    for name in [each for each in sorted(submission.files) if each.endswith(".py")][:_MOST_BESIDE]:
+    for name in [each for each in sorted(submission.files) if each.endswith(".py")][:_MAX_EXTRA_FILES]:
         if name in submission.python_files:
             yield _build_listing(name, None, submission.python_files[name].text)
 
 
 def _build_listing(name: str, part: Part | None, text: str) -> Listing:
-    lines = tuple(line[:_LONGEST_LINE].rstrip("\r") for line in text.split("\n", _MOST_LINES)[:_MOST_LINES])
+    lines = tuple(line[:_MAX_LINE_LENGTH].rstrip("\r") for line in text.split("\n", _MAX_LINES)[:_MAX_LINES])
     return Listing(name, part, lines)
 
 
 def _collect_distinct_texts(texts: Iterator[str]) -> tuple[str, ...]:
     distinct_texts: dict[str, None] = {}
     for text in texts:
-        distinct_texts[text[:LONGEST_TEXT]] = None
-        if len(distinct_texts) == _MOST_TEXTS:
+        distinct_texts[text[:MAX_TEXT_LENGTH]] = None
+        if len(distinct_texts) == _MAX_TEXTS:
             break
     return tuple(distinct_texts)
 

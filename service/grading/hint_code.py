@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 _SKIPPED_TOKENS = frozenset({tokenize.COMMENT, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER})
 _NAME = re.compile(r"[^\W\d]\w*\Z")
 _MAGIC = re.compile(r"^\s*[%!]")
-_MOST_STATEMENTS, _MOST_TOKENS = 3000, 400
+_MAX_STATEMENTS, _MAX_TOKENS = 3000, 400
 LOOPS = frozenset({"while", "for"})
 _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 
@@ -152,7 +152,7 @@ def read_code(lines: Sequence[str]) -> CodeStatements:
     text = "\n".join("#" if _MAGIC.match(line) else line for line in lines) + "\n"
     statements: list[Statement] = []
     open_blocks: list[Statement] = []
-    for number, statement in enumerate(itertools.islice(_split_statements(text), _MOST_STATEMENTS)):
+    for number, statement in enumerate(itertools.islice(_split_statements(text), _MAX_STATEMENTS)):
         while open_blocks and open_blocks[-1].indent >= statement.indent:
             open_blocks.pop()
         statements.append(replace(statement, number=number, parent=open_blocks[-1].number if open_blocks else -1))
@@ -211,7 +211,7 @@ def _split_statements(text: str) -> Iterator[Statement]:
 
 def _split_logical_line(tokens: list[tokenize.TokenInfo]) -> Iterator[Statement]:
     """Yield the statements of one logical line, split at semicolons and before a body on the same line."""
-    tokens = tokens[:_MOST_TOKENS]
+    tokens = tokens[:_MAX_TOKENS]
     first_token, strings = tokens[0], [token.string for token in tokens]
     indent, depth, start = first_token.start[1], 0, 0
     for index, string in enumerate(strings):

@@ -33,8 +33,8 @@ _PATH_CRITERIA = (Circuits, Displacement, Drawing, EndPose, Excursions, KeepsOut
 _ROUND_FACTORS = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2, 3)
 _STEP_FACTORS = (1.06**step for step in range(-28, 29) if step)
 _FACTORS = tuple(sorted((*_STEP_FACTORS, *_ROUND_FACTORS), key=lambda each: abs(math.log(each))))
-_MOST_TICKS = 250_000
-_MOST_LINES = 6
+_MAX_TICKS = 250_000
+_MAX_LINES = 6
 _MIN_PASS_SHARE = 0.999
 
 
@@ -63,10 +63,10 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
         return
     visible_criteria = [each for each in clues.definition.criteria if each.visibility == "visible"]
     path_criteria = [each for each in visible_criteria if isinstance(each, _PATH_CRITERIA)]
-    remaining_ticks = _MOST_TICKS
+    remaining_ticks = _MAX_TICKS
     ticks = sum(len(each.recording.ticks) for each in trials)
     best: tuple[float, float, _Change, float] | None = None
-    for change in list(_collect_changes(listing, trials))[:_MOST_LINES]:
+    for change in list(_collect_changes(listing, trials))[:_MAX_LINES]:
         passing_factors = []
         for factor in (-1.0, *_FACTORS):
             remaining_ticks -= ticks

@@ -34,7 +34,7 @@ from sim.recording_values import collect_faults
 from submissions.raw_files import sanitise_name
 
 _NON_ERROR_VERDICTS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
-_MOST_ERRORS, _LONGEST_ERROR = 3, 300
+_MAX_ERRORS, _MAX_ERROR_LENGTH = 3, 300
 _NO_FILE = re.compile(r"FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'")
 _NO_ACCESS = re.compile(r"^PermissionError|Permission denied|may only open files")
 _NO_KEY = re.compile(r"KeyError: '([^']+)'")
@@ -77,7 +77,7 @@ def hint_about_failed_cell(clues: Clues) -> Iterator[str]:
 def hint_about_errors(clues: Clues) -> Iterator[str]:
     """Yield the first error of each trial, with advice."""
     first_faults = (faults[0] for recording in clues.recordings if (faults := collect_faults(recording)))
-    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in first_faults))[:_MOST_ERRORS]:
+    for fault in list(dict.fromkeys(replace(each, t=0.0) for each in first_faults))[:_MAX_ERRORS]:
         if fault.verdict not in _NON_ERROR_VERDICTS:
             yield from _hint_about_error(fault, clues)
 
@@ -103,7 +103,7 @@ def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
 
 def describe_error(fault: Fault, clues: Clues) -> str:
     """Return the error message followed by advice."""
-    sentence = _VALUES.sub("", fault.message)[:_LONGEST_ERROR].rstrip(".")
+    sentence = _VALUES.sub("", fault.message)[:_MAX_ERROR_LENGTH].rstrip(".")
     advice = advise_on_error(fault, clues)
     if not advice:
         return sentence

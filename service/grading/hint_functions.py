@@ -21,7 +21,7 @@ _RETURNED_NOTHING = re.compile(r"returned (?:null|None|NoneType)")
 _GAVE_NOTHING = re.compile(r"TypeError: (\w+) returned NoneType, which has no \w+")
 _NO_FUNCTION = "there is no function called"
 _HIDDEN_CALLS = "hidden calls"
-_CALLED = re.compile(r"Expected (\w+)\(")
+_CALL = re.compile(r"Expected (\w+)\(")
 #: The expected list and the returned list.
 _LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
 _FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
@@ -37,7 +37,7 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.costliest_criteria:
         message = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
-        call_match, value_match = _CALLED.search(message), _VALUES.search(message)
+        call_match, value_match = _CALL.search(message), _VALUES.search(message)
         if call_match is None or value_match is None:
             continue
         advice = advise_on_difference(parse_value(value_match[1]), parse_value(value_match[2]))
@@ -105,7 +105,7 @@ def hint_about_wrong_values(name: str, message: str) -> str:
     """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
     expected = f"{message[0].lower()}{message[1:].rstrip('.')}"
     if _HIDDEN_CALLS not in message:
-        match = _CALLED.search(message)
+        match = _CALL.search(message)
         return f"The function {match[1] if match else name}: {expected}"
     return (
         f"The function {name}: {expected}. Call it yourself with other arguments: 0, the largest and the smallest, "

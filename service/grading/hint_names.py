@@ -15,7 +15,7 @@ from sim.recording import Fault
 UNDEFINED_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
 _NO_ATTRIBUTE = re.compile(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
 _NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
-_CALLED = re.compile(r"(?<![.\w])(\w+)\(")
+_CALL = re.compile(r"(?<![.\w])(\w+)\(")
 #: Python's form of constants from JSON and other languages.
 _CONSTANTS = {"null": "None", "none": "None", "NULL": "None", "true": "True", "false": "False"}
 
@@ -73,7 +73,7 @@ def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None,
     if (
         defining_listing is None
         or definition is None
-        or next(_collect_definitions(name[1], _list_same_process(listing, clues)), None)
+        or next(_collect_definitions(name[1], _list_process_listings(listing, clues)), None)
     ):
         return ""
     owner = defining_listing.name.capitalize() if defining_listing.part is None else defining_listing.name
@@ -93,7 +93,7 @@ def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _:
     name = UNDEFINED_NAME.match(fault.message)
     if name is None or listing is None or fault.cell is None:
         return ""
-    cells = [each for each in _list_same_process(listing, clues) if each.part is None]
+    cells = [each for each in _list_process_listings(listing, clues) if each.part is None]
     later_cell = next((each for each, _ in _collect_definitions(name[1], cells[cells.index(listing) + 1 :])), None)
     if later_cell is None:
         return ""
@@ -126,11 +126,11 @@ def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | No
         owners = _collect_owners(match[2], statement)
     elif _NOT_CALLABLE.match(fault.message):
         # The tokenizer returns an f-string as one token, so calls in it are searched by pattern.
-        owners = _CALLED.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
+        owners = _CALL.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
     else:
         return ""
     for name in owners:
-        for other_listing in _list_same_process(listing, clues):
+        for other_listing in _list_process_listings(listing, clues):
             for assignment in other_listing.code.statements:
                 if assignment.target == name and _is_shared_name(name, listing, clues):
                     location = (
@@ -149,7 +149,7 @@ def _is_shared_name(name: str, listing: Listing, clues: Clues) -> bool:
     """Return whether a name is that of a module, a function or a robot object, not only of this variable."""
     binding_statements = (
         each
-        for other in _list_same_process(listing, clues)
+        for other in _list_process_listings(listing, clues)
         for each in other.code.statements
         if each.keyword in ("import", "from", "def") and name in each.bound_names
     )
@@ -173,7 +173,7 @@ def _collect_definitions(name: str, listings: Iterator[Listing] | list[Listing])
                 yield listing, statement
 
 
-def _list_same_process(listing: Listing, clues: Clues) -> list[Listing]:
+def _list_process_listings(listing: Listing, clues: Clues) -> list[Listing]:
     """Return the texts in the same process, in order. Robot cells and files run alone."""
     if listing.part is not None or listing.name in {each.name for each in clues.programs}:
         return [listing]

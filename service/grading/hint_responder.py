@@ -29,7 +29,7 @@ _RESPONDER = re.compile(r"responder\Z|\w+_responder\Z")
 _EMPTY = re.compile(r"IndexError: list index out of range")
 _RETURN = re.compile(r"\breturn\b")
 _COLON = (('":"',), ("':'",))
-_MOST_OF_CONTENT = 12
+_MAX_CONTENT_LENGTH = 12
 _PY = re.compile(r"""["']PY::""")
 
 
@@ -195,7 +195,7 @@ def hint_about_double_json(clues: Clues) -> Iterator[str]:
 
 def hint_about_single_colon(clues: Clues) -> Iterator[str]:
     """Yield a hint on a message that is split at its first colon, so the rest begins with the second."""
-    contents = {text.partition("::")[2][:_MOST_OF_CONTENT] for text in clues.sent if "::" in text} - {""}
+    contents = {text.partition("::")[2][:_MAX_CONTENT_LENGTH] for text in clues.sent if "::" in text} - {""}
     if not clues.lost or not any(
         f":{each}" in text and f"::{each}" not in text for each in contents for text in clues.answers
     ):

@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from service.grading.hint_clues import Clues, Listing, describe_fault_line
 from service.grading.hint_code import Statement, is_name
 
-_CALLED = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(?:.* but (\d+) (?:was|were) given)?")
+_CALL = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(?:.* but (\d+) (?:was|were) given)?")
 
 
 def hint_about_signatures(clues: Clues) -> Iterator[str]:
     """Yield a hint on the definition that does not match a call."""
     for fault in clues.faults:
-        match = _CALLED.match(fault.message)
+        match = _CALL.match(fault.message)
         listing, head = _find_definition(match[2], clues) if match else (None, None)
         if match is None or listing is None or head is None:
             continue

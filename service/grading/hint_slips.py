@@ -28,7 +28,7 @@ _TEXT = re.compile(r"""[fbru]{0,2}["']""", re.IGNORECASE)
 _NUMBER = re.compile(r"\d+(?:\.\d+)?\Z")
 _BEFORE_OPERAND = frozenset({"if", "while", "elif", "and", "or", "not", "(", "return", "="})
 _AFTER_OPERAND = frozenset({":", ")", "and", "or"})
-_LONGEST_ENTRY = 40
+_MAX_ENTRY_LENGTH = 40
 _SlipCheck = Callable[[Listing, Statement], str]
 
 
@@ -158,7 +158,7 @@ def _check_missing_comma(listing: Listing, statement: Statement) -> str:
         is_text_pair = (
             _TEXT.match(first_text)
             and _TEXT.match(second_text)
-            and max(len(first_text), len(second_text)) <= _LONGEST_ENTRY
+            and max(len(first_text), len(second_text)) <= _MAX_ENTRY_LENGTH
         )
         if not is_text_pair or levels[index] == 0:
             continue

@@ -23,7 +23,7 @@ from submissions.criteria.texts import Messages, Prints, Says, TextSequence
 from submissions.submission import PART_FILES, Part
 
 _MIN_SIMILARITY = 0.72
-_MOST_TEXTS, _LONGEST = 20, 80
+_MAX_TEXTS, _MAX_TEXT_LENGTH = 20, 80
 _DIGITS = re.compile(r"[\d.,]+")
 #: The end of the text that the simulator prints when an image is logged.
 _LOGGED = "image data logged..."
@@ -83,7 +83,7 @@ def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterato
         for expected_text in expected_texts:
             if any(expected_text.is_met_by(text, ignore_case=should_ignore_case) for text in texts):
                 continue
-            similar_text = next((text for text in unexpected_texts[:_MOST_TEXTS] if is_near(expected_text, text)), None)
+            similar_text = next((text for text in unexpected_texts[:_MAX_TEXTS] if is_near(expected_text, text)), None)
             if similar_text is not None:
                 position = {"equals": "", "starts_with": " at its start"}.get(expected_text.how, " in it")
                 yield (
@@ -163,7 +163,7 @@ def _collect_expected_texts(criterion: Criterion) -> Iterator[ExpectedText]:
 
 def is_near(expected: ExpectedText, text: str) -> bool:
     """Return whether a part of the text is close to the expected text."""
-    if len(expected.text) > _LONGEST or len(text) > _LONGEST:
+    if len(expected.text) > _MAX_TEXT_LENGTH or len(text) > _MAX_TEXT_LENGTH:
         return False
     return any(_is_similar(part, expected.text) for part in expected.split_parts(text))
 

@@ -25,7 +25,7 @@ _MISSING_FLAG = re.compile(r"to have -(\w), but")
 #: A flag that takes a value, and the value after it.
 _VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
 _TOO_FEW_SAMPLES = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
-_PAIRS_TAKEN = re.compile(r"\d+ of (\d+) pairs are usable")
+_USABLE_PAIRS = re.compile(r"\d+ of (\d+) pairs are usable")
 _READING = re.compile(r"reading (\S+) to (\S+) %, but the sensor was reading (\d+(?:\.\d+)?) %")
 _X_NAME = re.compile(r"(?:\w*_)?d?x\d?\Z", re.IGNORECASE)
 _Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
@@ -139,7 +139,7 @@ def hint_about_few_images(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that is too fast to take enough images of its patterns."""
     for criterion in clues.lost:
         message = next((each.message for each in clues.results if each.id == criterion.id), "")
-        match = _PAIRS_TAKEN.search(message) if isinstance(criterion, Collects) else None
+        match = _USABLE_PAIRS.search(message) if isinstance(criterion, Collects) else None
         drive_statements = [
             (listing, each)
             for listing, each in collect_statements(clues)

@@ -25,7 +25,7 @@ from service.grading.hint_answers import (
 )
 from service.grading.hint_braces import hint_about_braces
 from service.grading.hint_cause_lines import hint_about_cause_line
-from service.grading.hint_clues import LONGEST_TEXT, Clues, collect_clues
+from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues, collect_clues
 from service.grading.hint_counterfactuals import hint_about_wrong_number
 from service.grading.hint_errors import hint_about_cell_errors, hint_about_errors, hint_about_failed_cell
 from service.grading.hint_failure_lines import hint_about_failure_line, hint_about_unentered_loop
@@ -348,7 +348,7 @@ def _hint_about_missing_keys(clues: Clues) -> Iterator[str]:
     required_keys = list(
         dict.fromkeys(key for form in _extract_json_objects(_join_task_lines(clues)) for key in _KEY.findall(form))
     )
-    answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < LONGEST_TEXT]
+    answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < MAX_TEXT_LENGTH]
     answer_keys = {key for text in answers for key in _KEY.findall(text)}
     missing_keys = [key for key in required_keys if key not in answer_keys]
     if missing_keys and answer_keys:

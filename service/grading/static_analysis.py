@@ -38,7 +38,7 @@ _READER = ResponderSpec(
 )
 #: Size limits for all files together and for one file. They exceed the reader's limits slightly, so that it reports
 #: them.
-_MOST_READ, _MOST_OF_ONE = 1_000_001, 300_001
+_MAX_TOTAL_CHARACTERS, _MAX_FILE_CHARACTERS = 1_000_001, 300_001
 #: The names of a responder's functions.
 _RESPONDERS = ("responder", "*_responder")
 
@@ -140,12 +140,12 @@ def _read_files(part: Part, plan: RunPlan) -> Iterator[Mapping[str, Any]]:
 
     A responder may import any of them. They are passed as bytes, because they declare their own encoding.
     """
-    yield {"name": "", **{kind: content[:_MOST_OF_ONE] for kind, content in plan.read_as[part].items()}}
+    yield {"name": "", **{kind: content[:_MAX_FILE_CHARACTERS] for kind, content in plan.read_as[part].items()}}
     spec = plan.program if part == "program" else plan.functions
-    remaining_characters = _MOST_READ - (len(spec.code.text) if spec is not None else 0)
+    remaining_characters = _MAX_TOTAL_CHARACTERS - (len(spec.code.text) if spec is not None else 0)
     for name, kind, content in _list_neighbour_files(part, plan):
         if remaining_characters > 0:
-            yield {"name": name, kind: content[:_MOST_OF_ONE]}
+            yield {"name": name, kind: content[:_MAX_FILE_CHARACTERS]}
         remaining_characters -= len(content)
 
 

@@ -20,7 +20,7 @@ from responders.repeated_faults import FaultReplay
 from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.private_folders import remove_left_overs
+from responders.sandbox.private_folders import remove_stale_folders
 from responders.sandbox.processor import one_processor
 from responders.sandbox.running_child import LibrariesNeeded
 from responders.training import Predictions, TrainingSpec, train_and_predict
@@ -36,7 +36,7 @@ from sim.robot import Robot
 from sim.shared_arena import SharedArena
 
 _log = logging.getLogger(__name__)
-_MOST_ARENAS = 4
+_MAX_ARENAS = 4
 Result = TypeVar("Result")
 Key = TypeVar("Key")
 AnArena = TypeVar("AnArena", bound=Arena)
@@ -56,7 +56,7 @@ class TrialRunner:
         slots: GraderLocks | None = None,
         spares: bool = True,
     ) -> None:
-        remove_left_overs()
+        remove_stale_folders()
         self._slots = slots
         self._sandboxes = sandboxes or Sandboxes()
         self._spares = spares
@@ -239,6 +239,6 @@ def _reuse_or_create(arenas: OrderedDict[Key, AnArena], key: Key, make: Callable
     """Return the arena of this key, created if needed. Closes the least recently used arena beyond the limit."""
     arena = arenas.pop(key, None) or make()
     arenas[key] = arena
-    while len(arenas) > _MOST_ARENAS:
+    while len(arenas) > _MAX_ARENAS:
         arenas.popitem(last=False)[1].close()
     return arena

@@ -25,7 +25,7 @@ MEMBERS_CLAIM = "https://purl.imsglobal.org/spec/lti-nrps/claim/namesroleservice
 GRADES_CLAIM = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
 _MEMBERSHIP_ROLES = "http://purl.imsglobal.org/vocab/lis/v2/membership"
 _CLOCK_LEEWAY_SECONDS = 60
-_LONGEST_TEXT = 250
+_MAX_TEXT_LENGTH = 250
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
         role=parse_role(claims.get(f"{CLAIM}roles")),
         deployment=deployment_id,
         context=context_id,
-        course_title=str(title)[:_LONGEST_TEXT],
+        course_title=str(title)[:_MAX_TEXT_LENGTH],
         members_url=read_string(_read_object(claims, MEMBERS_CLAIM), "context_memberships_url"),
         lineitems_url=read_string(_read_object(claims, GRADES_CLAIM), "lineitems"),
     )
@@ -105,7 +105,9 @@ def build_student(platform: Platform, subject: str, id: str | None, name: str | 
 
     Only names and e-mail addresses are truncated, because truncated ids could collide.
     """
-    return Student(id or f"{platform.name} {subject}", (name or "")[:_LONGEST_TEXT], (email or "")[:_LONGEST_TEXT])
+    return Student(
+        id or f"{platform.name} {subject}", (name or "")[:_MAX_TEXT_LENGTH], (email or "")[:_MAX_TEXT_LENGTH]
+    )
 
 
 def _verify_token(pending: PendingLaunch, id_token: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from service.version import GRADER_VERSION
 from sim.errors import HostError
 from sim.readers.json_text import read_json
 
-_MOST_BYTES = 4 * 2**20
+_MAX_BYTES = 4 * 2**20
 
 
 class PlatformError(HostError):
@@ -37,15 +37,15 @@ def fetch_json(
     request_headers = {"User-Agent": f"Robomark/{GRADER_VERSION}", **(headers or {})}
     try:
         answer = send_request(
-            url, method=method, body=body, headers=request_headers, allowlist=ALL_NETWORKS, most_bytes=_MOST_BYTES
+            url, method=method, body=body, headers=request_headers, allowlist=ALL_NETWORKS, max_bytes=_MAX_BYTES
         )
     except RequestFailure as error:
         raise PlatformError(f"The platform at {host} cannot be reached: {error}") from None
     # Requests contain our token, which no other host may get, so a redirection is an error, too.
     if not 200 <= answer.status < 300:
         raise PlatformError(f"The platform at {host} returned status {answer.status} for a {method} request")
-    if len(answer.body) > _MOST_BYTES:
-        raise PlatformError(f"The platform at {host} returned more than {_MOST_BYTES} bytes")
+    if len(answer.body) > _MAX_BYTES:
+        raise PlatformError(f"The platform at {host} returned more than {_MAX_BYTES} bytes")
     try:
         return PlatformReply(read_json(answer.body) if answer.body.strip() else None, answer.headers.get("link", ""))
     except ValueError:

@@ -36,7 +36,7 @@ _LINEITEMS = "application/vnd.ims.lis.v2.lineitemcontainer+json"
 _SCORE = "application/vnd.ims.lis.v1.score+json"
 # Without "<" in the address, a search takes time linear in the length of the header.
 _NEXT_LINK = re.compile(r'<([^<>]+)>\s*;\s*rel="?next"?')
-_MOST_PAGES = 200
+_MAX_PAGES = 200
 _ASSERTION_SECONDS = 60
 
 
@@ -175,7 +175,7 @@ def _check_origin(platform: Platform, url: str) -> None:
 
 
 def _fetch_pages(platform: Platform, url: str, headers: Mapping[str, str]) -> Iterator[Any]:
-    for _ in range(_MOST_PAGES):
+    for _ in range(_MAX_PAGES):
         reply = _send_request(platform, url, headers=headers)
         yield reply.value
         next_link = _NEXT_LINK.search(reply.link)

@@ -12,11 +12,11 @@ from service.operations.lookup import load_names_for_actor, require_course, requ
 from service.store.courses import open_assignments
 from service.store.engine import retry_conflicts
 from service.store.grades import appeals
-from service.store.grades.appeals import LONGEST_TEXT, AppealLine
+from service.store.grades.appeals import MAX_TEXT_LENGTH, AppealLine
 from service.store.models import SubmissionRow
 from service.store.states import Role
 
-__all__ = ["LONGEST_TEXT"]
+__all__ = ["MAX_TEXT_LENGTH"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
 from submissions.student_identity import Student
 
-_MOST_ENTRIES, _MOST_BYTES = 2000, 200_000_000
+_MAX_ENTRIES, _MAX_BYTES = 2000, 200_000_000
 
 
 class AssignmentAlreadySeen(Conflict):
@@ -57,7 +57,7 @@ def upload(service: Service, actor: Actor, course_id: int, request: UploadReques
 
     Raises:
         NotFound: The actor does not instruct the course.
-        StudentsKnowAnother: The upload would replace an assignment that students have seen.
+        AssignmentAlreadySeen: The upload would replace an assignment that students have seen.
         UsageError: The zip contains no valid assignment; each mistake is a line.
     """
     with service.store.reading() as session:
@@ -134,7 +134,7 @@ def _unpack_assignment(path: Path) -> Path:
     # Error messages name this folder if the zip has no top folder.
     destination = path.parent / "unpacked" / path.stem
     destination.mkdir(parents=True)
-    unzip(path, destination, _MOST_ENTRIES, _MOST_BYTES)
+    unzip(path, destination, _MAX_ENTRIES, _MAX_BYTES)
     entries = [each for each in destination.iterdir() if each.name != "__MACOSX"]
     folder = entries[0] if len(entries) == 1 and entries[0].is_dir() else destination
     if not (folder / FILE_NAME).is_file():

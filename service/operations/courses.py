@@ -24,7 +24,7 @@ from service.store.states import Role
 from submissions.student_identity import Student
 
 #: Longest name of a course.
-LONGEST_NAME = 100
+MAX_NAME_LENGTH = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +124,8 @@ def add_member(service: Service, actor: Actor, request: MemberRequest) -> AddedM
     course, student = request.course.strip(), Student(request.id.strip(), request.name.strip(), request.email.strip())
     if not course or not student.id:
         raise Invalid("names of courses and members must contain visible characters")
-    if len(course) > LONGEST_NAME:
-        raise Invalid("the course name is too long; use at most %(most)s characters", most=LONGEST_NAME)
+    if len(course) > MAX_NAME_LENGTH:
+        raise Invalid("the course name is too long; use at most %(most)s characters", most=MAX_NAME_LENGTH)
     check_lengths([student])
     is_student = request.role is Role.STUDENT
     if is_student:

@@ -12,7 +12,7 @@ from service.operations.errors import Conflict, Forbidden, Invalid, NotFound
 from service.operations.scopes import list_offered_scopes
 from service.store import audit
 from service.store.people import credentials
-from service.store.people.credentials import MOST_TOKENS, CredentialLine, Reach
+from service.store.people.credentials import MAX_TOKENS, CredentialLine, Reach
 from service.store.states import Role
 
 
@@ -91,8 +91,8 @@ def check_scopes(
 
 def check_token_count(session: Session, person_id: int) -> None:
     """Raise Conflict if a person has the maximum number of tokens."""
-    if credentials.count_tokens(session, person_id) >= MOST_TOKENS:
-        raise Conflict("The limit of %(count)s tokens is reached. Revoke a token first.", count=MOST_TOKENS)
+    if credentials.count_tokens(session, person_id) >= MAX_TOKENS:
+        raise Conflict("The limit of %(count)s tokens is reached. Revoke a token first.", count=MAX_TOKENS)
 
 
 def _require_person_id(actor: Actor) -> int:

@@ -16,13 +16,13 @@ from service.store.batches.batches import JobLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import retry_conflicts
 from service.store.grades import comments, marking_history, overrides
-from service.store.grades.comments import LONGEST_COMMENT, CommentLine
+from service.store.grades.comments import MAX_COMMENT_LENGTH, CommentLine
 from service.store.grades.marking_history import MarkingStep
-from service.store.grades.overrides import LONGEST_REASON, CriterionMarks
+from service.store.grades.overrides import MAX_REASON_LENGTH, CriterionMarks
 from service.store.models import AssignmentVersion, Job
 from service.store.states import JobState, Role
 
-__all__ = ["LONGEST_COMMENT", "LONGEST_REASON"]
+__all__ = ["MAX_COMMENT_LENGTH", "MAX_REASON_LENGTH"]
 
 
 @dataclass(frozen=True, slots=True)

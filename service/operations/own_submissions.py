@@ -26,7 +26,7 @@ from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
 
 #: Per student and assignment; only the newest submissions are shown.
-MOST_SHOWN = 50
+MAX_LISTED_SUBMISSIONS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ def _select_attempts(
     row = aliased(SubmissionRow)
     newest_ids = select(row.id).where(row.enrolment_id == enrolment_id, row.assignment == assignment)
     is_included = or_(
-        SubmissionRow.id.in_(newest_ids.order_by(row.attempt.desc()).limit(MOST_SHOWN)),
+        SubmissionRow.id.in_(newest_ids.order_by(row.attempt.desc()).limit(MAX_LISTED_SUBMISSIONS)),
         _is_counting(enrolment_id),
         *also,
     )
@@ -233,7 +233,7 @@ def _select_attempts(
 
 
 def _build_attempts(submissions: list[OwnSubmission]) -> OwnAttempts:
-    return OwnAttempts(submissions[:MOST_SHOWN], next((each for each in submissions if each.counts), None))
+    return OwnAttempts(submissions[:MAX_LISTED_SUBMISSIONS], next((each for each in submissions if each.counts), None))
 
 
 def _is_counting(enrolment_id: int) -> ColumnElement[bool]:

@@ -25,7 +25,7 @@ from service.store.states import CredentialKind, Role
 from sim.sentences import Sentence
 from submissions.student_identity import Student
 
-_LONGEST_TEXT = 200
+_MAX_TEXT_LENGTH = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +158,11 @@ def enrol_new(service: Service, actor: Actor, course_id: int, student: Student) 
 def check_lengths(students: Sequence[Student]) -> None:
     """Raise Invalid if an id, a name or an e-mail address is too long."""
     for student in students:
-        if max(map(len, (student.id, student.name, student.email))) > _LONGEST_TEXT:
+        if max(map(len, (student.id, student.name, student.email))) > _MAX_TEXT_LENGTH:
             raise Invalid(
                 "%(id)s: the ID, name or address is too long, expected at most %(most)s characters",
-                id=student.id[:_LONGEST_TEXT],
-                most=_LONGEST_TEXT,
+                id=student.id[:_MAX_TEXT_LENGTH],
+                most=_MAX_TEXT_LENGTH,
             )
 
 

@@ -13,7 +13,7 @@ from service.store import audit
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.people import lti
-from service.store.people.lti import LONGEST_REGISTERED as LONGEST_REGISTERED
+from service.store.people.lti import MAX_REGISTERED_LENGTH as MAX_REGISTERED_LENGTH
 from service.store.people.lti import CourseLink, Platform
 from service.store.people.lti import Registration as Registration
 from service.store.states import Role

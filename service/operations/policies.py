@@ -14,7 +14,7 @@ from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
 from service.store.states import Role
 
-_MOST_LATE_DAYS, _MOST_ATTEMPTS, _MOST_COOL_DOWN_SECONDS = 365, 1000, 600_000
+_MAX_LATE_DAYS, _MAX_ATTEMPTS, _MAX_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +42,14 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
         UsageError: The assignment does not exist.
     """
     _check_due_date(limits.due_at)
-    if not 0 <= limits.late_days <= _MOST_LATE_DAYS:
-        raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MOST_LATE_DAYS)
-    if limits.attempts is not None and not 1 <= limits.attempts <= _MOST_ATTEMPTS:
-        raise Invalid("attempts must be from 1 to %(most)s, or empty for no limit", most=_MOST_ATTEMPTS)
-    if not 0 <= limits.cool_down_seconds <= _MOST_COOL_DOWN_SECONDS:
+    if not 0 <= limits.late_days <= _MAX_LATE_DAYS:
+        raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MAX_LATE_DAYS)
+    if limits.attempts is not None and not 1 <= limits.attempts <= _MAX_ATTEMPTS:
+        raise Invalid("attempts must be from 1 to %(most)s, or empty for no limit", most=_MAX_ATTEMPTS)
+    if not 0 <= limits.cool_down_seconds <= _MAX_COOL_DOWN_SECONDS:
         raise Invalid(
             "the minimum time between submissions must be from 0 to %(most)s minutes",
-            most=_MOST_COOL_DOWN_SECONDS // 60,
+            most=_MAX_COOL_DOWN_SECONDS // 60,
         )
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
@@ -92,8 +92,8 @@ def extend(
     if request.due_at is None and not request.more_attempts:
         raise Invalid("an extension needs a later deadline, additional attempts, or both")
     _check_due_date(request.due_at)
-    if not 0 <= request.more_attempts <= _MOST_ATTEMPTS:
-        raise Invalid("additional attempts must be from 0 to %(most)s", most=_MOST_ATTEMPTS)
+    if not 0 <= request.more_attempts <= _MAX_ATTEMPTS:
+        raise Invalid("additional attempts must be from 0 to %(most)s", most=_MAX_ATTEMPTS)
     with service.store.transaction() as session:
         row = require_student(session, actor, course_id, enrolment_id)
         check_assignment(session, request.assignment)

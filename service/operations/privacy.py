@@ -24,7 +24,7 @@ from service.store.locks import lock_course
 from service.store.purge import PurgeCounts
 from service.store.states import Role
 
-_MOST_DAYS = 36_500
+_MAX_DAYS = 36_500
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +104,8 @@ def purge(service: Service, actor: Actor, course_id: int, request: PurgeRequest)
     Raises Forbidden unless called by a command, NotFound, and Invalid for a number of days that is out of range.
     """
     check_machine(actor)
-    if not 1 <= request.older_than_days <= _MOST_DAYS:
-        raise Invalid("the age must be from 1 to %(most)s days", most=_MOST_DAYS)
+    if not 1 <= request.older_than_days <= _MAX_DAYS:
+        raise Invalid("the age must be from 1 to %(most)s days", most=_MAX_DAYS)
     with service.store.reading() as session:
         require_course(session, actor, course_id)
         cutoff = now(session) - timedelta(days=request.older_than_days)

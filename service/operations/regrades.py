@@ -108,7 +108,7 @@ def publish_one(
 
 
 def preview_publication(service: Service, actor: Actor, course_id: int, batch_id: str) -> PublicationPreview:
-    """Return the effect of publishing a batch now, without ``anyway``. Raises NotFound."""
+    """Return the effect of publishing a batch now, without unjudged grades. Raises NotFound."""
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)

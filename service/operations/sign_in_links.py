@@ -32,7 +32,7 @@ from sim.errors import UsageError
 from submissions.student_identity import Student
 
 #: Lifetime in days of links for a whole course, which are distributed by other means.
-DAYS, MOST_DAYS = 7, 30
+DAYS, MAX_DAYS = 7, 30
 _ELSEWHERE = "is also in other courses, so only the operator can create a sign-in link"
 
 
@@ -61,8 +61,8 @@ def make_links(service: Service, actor: Actor, course_id: int, days: int = DAYS)
 
     Raises NotFound, and Invalid for a number of days that is out of range, or if names are hidden.
     """
-    if not 1 <= days <= MOST_DAYS:
-        raise Invalid("sign-in links can be valid for 1 to %(most)s days", most=MOST_DAYS)
+    if not 1 <= days <= MAX_DAYS:
+        raise Invalid("sign-in links can be valid for 1 to %(most)s days", most=MAX_DAYS)
     lifetime = timedelta(days=days)
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)

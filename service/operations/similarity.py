@@ -12,7 +12,7 @@ from service.operations.lookup import load_names_for_actor, require_batch, requi
 from service.similarity.pairs import Similarity
 from service.store.batches import batches
 from service.store.batches.batches import BatchLine, JobLine
-from service.store.batches.similarities import MOST_AT_ONCE, SourceTexts, find_similar_submissions
+from service.store.batches.similarities import MAX_COMPARED_SUBMISSIONS, SourceTexts, find_similar_submissions
 from service.store.states import Role
 
 
@@ -38,7 +38,9 @@ def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
         line = batches.load_batch(session, batch_id)
         assignments = sorted({each.assignment for each in batches.load_job_lines(session, batch_id)})
         lines = tuple(batches.load_course_lines(session, course_id, assignments, hidden_names))
-    similarities = tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MOST_AT_ONCE else None
+    similarities = (
+        tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MAX_COMPARED_SUBMISSIONS else None
+    )
     return ComparedBatch(line, lines, similarities, SourceTexts(service.store, lines).load_text)
 
 
@@ -53,7 +55,7 @@ def list_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
             "%(count)s submissions are too many for an immediate comparison, expected at most %(most)s; "
             "to compare the submissions of this batch, run robomark batch similar %(batch)s",
             count=len(compared_batch.lines),
-            most=MOST_AT_ONCE,
+            most=MAX_COMPARED_SUBMISSIONS,
             batch=batch_id,
         )
     return compared_batch.found

@@ -88,7 +88,7 @@ def submit(service: Service, actor: Actor, course_id: int, request: SubmissionRe
 
     Raises:
         NotFound: Students cannot see the assignment.
-        LacksPart: One of two parts is missing.
+        MissingPart: One of two parts is missing.
         UsageError: The assignment is closed, or the files are not a valid submission.
     """
     target = load_submission_target(service, actor, course_id, request.assignment)

@@ -11,7 +11,7 @@ from service.operations.lookup import require_course
 from service.store import audit
 from service.store.outbox import WebhookEvent as WebhookEvent
 from service.store.people import webhooks
-from service.store.people.webhooks import LONGEST_URL as LONGEST_URL
+from service.store.people.webhooks import MAX_URL_LENGTH as MAX_URL_LENGTH
 from service.store.people.webhooks import DeliveryLine, WebhookLine
 from service.store.states import Role
 

@@ -31,7 +31,7 @@ _SOCKET_BYTES = 100  # Unix allows 107 for a socket's path
 _START_SECONDS = 15.0
 _PING_SECONDS = 2.0
 #: Our own unresponsive server is stopped after this number of pings, because a busy machine is slow, too.
-_MOST_UNANSWERED_PINGS = 5
+_MAX_UNANSWERED_PINGS = 5
 
 
 def prepare_socket_path(settings: Settings) -> Path:
@@ -106,7 +106,7 @@ class EmbeddedBroker:
             return
         if self._process is not None and self._process.poll() is None:
             self._unanswered += 1
-            if self._unanswered < _MOST_UNANSWERED_PINGS:
+            if self._unanswered < _MAX_UNANSWERED_PINGS:
                 return
         self._stop_process(grace_seconds=1)
         self._start_under_lock()

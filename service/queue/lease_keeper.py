@@ -34,12 +34,12 @@ os.register_at_fork(
 class LeaseKeeper:
     """Renews a lease within a ``with`` block; ``check`` raises when the work must stop."""
 
-    def __init__(self, renew: Callable[[], None], lease_seconds: float, most_seconds: float) -> None:
-        """Create a keeper. ``renew`` raises Cancelled if the lease is lost. Renewals stop after ``most_seconds``."""
+    def __init__(self, renew: Callable[[], None], lease_seconds: float, max_seconds: float) -> None:
+        """Create a keeper. ``renew`` raises Cancelled if the lease is lost. Renewals stop after ``max_seconds``."""
         self._renew = renew
-        self._every = min(lease_seconds / 3, _PROGRESS_SECONDS)
-        self._most = most_seconds
-        self._until = time.monotonic() + most_seconds
+        self._renewal_seconds = min(lease_seconds / 3, _PROGRESS_SECONDS)
+        self._max_seconds = max_seconds
+        self._deadline = time.monotonic() + max_seconds
         self._ended = Event()
         self._lost: Cancelled | None = None
         self._thread = Thread(target=self._run, name="lease keeper", daemon=True)
@@ -56,14 +56,14 @@ class LeaseKeeper:
         """Raise Cancelled if the lease is lost, HostError if the time limit has passed."""
         if self._lost is not None:
             raise self._lost
-        if time.monotonic() > self._until:
-            raise HostError(f"it took longer than {self._most:.0f} s")
+        if time.monotonic() > self._deadline:
+            raise HostError(f"it took longer than {self._max_seconds:.0f} s")
 
     def _run(self) -> None:
         # A task that hangs forever must not keep its lease.
-        wait = self._every
-        while not self._ended.wait(wait) and time.monotonic() <= self._until:
-            wait = self._every
+        wait = self._renewal_seconds
+        while not self._ended.wait(wait) and time.monotonic() <= self._deadline:
+            wait = self._renewal_seconds
             with _renewal_lock:
                 try:
                     self._renew()
@@ -72,7 +72,7 @@ class LeaseKeeper:
                     return
                 except DBAPIError as error:
                     # The next renewal tries again. If the lease expires meanwhile, its token is rejected.
-                    wait = min(self._every, _RETRY_SECONDS)
+                    wait = min(self._renewal_seconds, _RETRY_SECONDS)
                     _log.warning("heartbeat.failed", error=str(error))
                 except Exception:
                     _log.exception("heartbeat.failed")

@@ -32,7 +32,7 @@ from submissions.submission import Submission
 _log = structlog.get_logger(__name__)
 _ANSWER_FILE = KNOWN_ANSWER_FOLDER / "answer.json"
 #: Maximum delay of the first self-test if it was skipped at start-up.
-_LONGEST_FIRST_DELAY_SECONDS = 30.0
+_MAX_FIRST_DELAY_SECONDS = 30.0
 #: A trial with such an end was cut short by the machine or its load, and is not evidence against the simulator.
 _CUT_SHORT_VERDICTS = frozenset({Verdict.HOST_ERROR, Verdict.CPU_LIMIT, Verdict.MEMORY_LIMIT, Verdict.STALLED})
 
@@ -120,7 +120,7 @@ class SelfTester:
         """Run the self-test now, or soon if this build has passed recently on this machine."""
         with nullcontext() if self._right is None else self._right.alone():
             if self._right is not None and self._right.given:
-                self._next = time.monotonic() + min(self._every, _LONGEST_FIRST_DELAY_SECONDS)
+                self._next = time.monotonic() + min(self._every, _MAX_FIRST_DELAY_SECONDS)
             else:
                 self.look()
 

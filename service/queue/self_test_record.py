@@ -25,7 +25,7 @@ KNOWN_ANSWER_FOLDER = Path(__file__).with_name("known_answer")
 SELF_TEST_ROLES: tuple[ChildRole, ...] = ("responder", "robot")
 _VALID_SECONDS = 86_400
 #: A process that waits longer runs the self-test itself, because the start of a pool child has a time limit.
-_LONGEST_WAIT_SECONDS = 20.0
+_MAX_WAIT_SECONDS = 20.0
 _POLL_SECONDS = 0.02
 #: Identify a machine and its current boot.
 _MACHINE = (Path("/proc/sys/kernel/random/boot_id"), Path("/proc/version"))
@@ -59,7 +59,7 @@ class SelfTestRecord:
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Prevent other processes of the home from running the self-test, within a time limit."""
-        deadline = time.monotonic() + _LONGEST_WAIT_SECONDS
+        deadline = time.monotonic() + _MAX_WAIT_SECONDS
         while self._lock is None and not self._try_lock() and time.monotonic() < deadline:
             time.sleep(_POLL_SECONDS)
         try:

@@ -23,10 +23,10 @@ from sim.processes import build_python_command
 _WORKER_CODE = "import gc; gc.disable(); from service.queue.worker import main; main()"
 #: A process that ends sooner than this after its start is restarted only after a delay, which doubles.
 _SHORT_LIFE_SECONDS = 10.0
-_LONGEST_WAIT_SECONDS = 60.0
+_MAX_WAIT_SECONDS = 60.0
 #: A worker without activity for this long is stopped; its start alone can take a while.
-_SILENT_SECONDS = 120.0
-_LONGEST_STEP_SECONDS = 2.0
+_MAX_SILENT_SECONDS = 120.0
+_MAX_STEP_SECONDS = 2.0
 _PING_SECONDS = 2.0
 
 
@@ -37,10 +37,10 @@ class SupervisedProcess:
         self._command = command
         self._environment = environment
         self._log = log
-        self._kept_open = descriptors
+        self._descriptors = descriptors
         self._process: subprocess.Popen[bytes] | None = None
-        self._begun = 0.0
-        self._not_before = 0.0
+        self._start_time = 0.0
+        self._earliest_start = 0.0
         self.short_lives = 0  # consecutive
 
     @property
@@ -58,10 +58,10 @@ class SupervisedProcess:
         if self._process is None or self._process.poll() is None:
             return False
         self._process = None
-        is_short = time.monotonic() - self._begun < _SHORT_LIFE_SECONDS
+        is_short = time.monotonic() - self._start_time < _SHORT_LIFE_SECONDS
         self.short_lives = self.short_lives + 1 if is_short else 0
-        wait = min(2.0 ** (self.short_lives - 1), _LONGEST_WAIT_SECONDS) if is_short else 0.0
-        self._not_before = time.monotonic() + wait
+        wait = min(2.0 ** (self.short_lives - 1), _MAX_WAIT_SECONDS) if is_short else 0.0
+        self._earliest_start = time.monotonic() + wait
         return True
 
     def start(self, extra: dict[str, str]) -> bool:
@@ -69,11 +69,11 @@ class SupervisedProcess:
 
         Return whether it started.
         """
-        if self._process is not None or time.monotonic() < self._not_before:
+        if self._process is not None or time.monotonic() < self._earliest_start:
             return False
-        self._begun = time.monotonic()
+        self._start_time = time.monotonic()
         self._process = start_process(
-            self._command, self._environment | extra, self._log, signal.SIGKILL, self._kept_open
+            self._command, self._environment | extra, self._log, signal.SIGKILL, self._descriptors
         )
         return True
 
@@ -107,9 +107,9 @@ class SupervisedWorker:
         self._store = store
         self.process = SupervisedProcess(build_python_command("-c", _WORKER_CODE), settings.to_environment(), log)
         self._name = ""
-        self._seen = 0
-        self._looked = 0.0
-        self._silent = 0.0
+        self._heartbeat_time = 0
+        self._last_check = 0.0
+        self._silent_seconds = 0.0
 
     @property
     def takes_messages(self) -> bool:
@@ -148,23 +148,23 @@ class SupervisedWorker:
         self.release_jobs()
         name = create_worker_name()
         if self.process.start({WORKER_VARIABLE: name}):
-            self._name, self._seen, self._silent, self._looked = name, 0, 0.0, time.monotonic()
+            self._name, self._heartbeat_time, self._silent_seconds, self._last_check = name, 0, 0.0, time.monotonic()
 
     def _is_silent(self) -> bool:
-        """Return whether it has not touched its file for long although the broker responds.
+        """Return whether the worker has not touched its heartbeat file for too long although the broker responds.
 
         Counts only observed time, so changes of the clock have no effect.
         """
         moment = time.monotonic()
-        self._silent += min(moment - self._looked, _LONGEST_STEP_SECONDS)
-        self._looked = moment
+        self._silent_seconds += min(moment - self._last_check, _MAX_STEP_SECONDS)
+        self._last_check = moment
         try:
             heartbeat_time = build_heartbeat_path(self._settings, self._name).stat().st_mtime_ns
         except OSError:
             heartbeat_time = 0
-        if heartbeat_time != self._seen:
-            self._seen, self._silent = heartbeat_time, 0.0
-        if self._silent < _SILENT_SECONDS:
+        if heartbeat_time != self._heartbeat_time:
+            self._heartbeat_time, self._silent_seconds = heartbeat_time, 0.0
+        if self._silent_seconds < _MAX_SILENT_SECONDS:
             return False
-        self._silent = 0.0
+        self._silent_seconds = 0.0
         return fetch_broker_version(self._settings.broker_url, _PING_SECONDS) is not None

@@ -34,7 +34,7 @@ from service.version import describe_release_problem
 
 _log = structlog.get_logger(__name__)
 _ALIVE_SECONDS = 5.0
-_LONGEST_REAP_SECONDS = 5.0
+_MAX_REAP_SECONDS = 5.0
 _UNBLOCK_SECONDS = 1.0
 #: Number of consecutive beats with waiting messages, an idle worker and no message received.
 _STALLED_BEATS = 3
@@ -64,15 +64,15 @@ class _ConsumerMonitor:
 
     def __init__(self, beat: _BeatState) -> None:
         self._state = beat
-        self._taken = 0
+        self._last_message_count = 0
         self._beats = 0
 
     def check(self) -> None:
         """Check at each beat. Raises an error that makes Celery reconnect if the worker receives no messages."""
         message_count = state.all_total_count[0]
         is_idle = not state.reserved_requests and not state.active_requests
-        is_deaf = is_idle and self._state.waiting > 0 and message_count == self._taken
-        self._taken, self._beats = message_count, self._beats + 1 if is_deaf else 0
+        is_deaf = is_idle and self._state.waiting > 0 and message_count == self._last_message_count
+        self._last_message_count, self._beats = message_count, self._beats + 1 if is_deaf else 0
         if self._beats >= _STALLED_BEATS:
             self._beats = 0
             raise BrokerGone("messages are queued, but none arrives")
@@ -83,7 +83,7 @@ def add_steps(app: Celery, store: Store, settings: Settings, worker: WorkerDescr
     beat = _BeatState()
     app.conf.broker_transport_options["client_name"] = worker.name
     notifier = Notifier(app, store, settings)
-    period = min(settings.lease_seconds / 3, _LONGEST_REAP_SECONDS)
+    period = min(settings.lease_seconds / 3, _MAX_REAP_SECONDS)
 
     problems: set[str] = set()
 

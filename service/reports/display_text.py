@@ -12,7 +12,7 @@ from decimal import Decimal
 
 #: Joiners that emoji and several scripts need. All other invisible format characters are spelled out.
 _JOINERS = "\u200c\u200d"
-_LONGEST_MARKS = 6  # combining marks on one letter; living scripts need no more
+_MAX_COMBINING_MARKS = 6  # combining marks on one letter; living scripts need no more
 _HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Cn", "Zl", "Zp"})
 
 
@@ -86,7 +86,7 @@ def _escape_invisible(line: str) -> str:
         marks = marks + 1 if category in ("Mn", "Me") else 0
         if character == "\t":
             pieces.append("    ")
-        elif marks > _LONGEST_MARKS or (category in _HIDDEN_CATEGORIES and character not in _JOINERS):
+        elif marks > _MAX_COMBINING_MARKS or (category in _HIDDEN_CATEGORIES and character not in _JOINERS):
             pieces.append(_escape_character(character))
         else:
             pieces.append(character)

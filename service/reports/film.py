@@ -44,7 +44,7 @@ Point = tuple[float, float]
 
 #: Frame duration in milliseconds. A GIF counts in hundredths of a second.
 FRAME_MILLISECONDS = 80
-MOST_FRAMES = 300
+MAX_FRAMES = 300
 _LAST_FRAME_MILLISECONDS = 2000
 _WIDTH, _LOWEST, _HIGHEST, _STRIP = 640, 240, 420, 50  # pixels
 _MARGIN, _BEYOND, _CLOSEST = 150, 400, 640  # mm
@@ -55,7 +55,7 @@ _IMAGE_COLOURS, _TOO_NEAR = 150, 8
 _OVERSAMPLING = 3  # drawings are enlarged by this factor first, for smooth edges
 _ULTRASONIC_LIMIT = 2550  # mm
 #: The shortest and longest display of a text, in frames.
-_SHORTEST, _LONGEST = 10, 25
+_MIN_CAPTION_FRAMES, _MAX_CAPTION_FRAMES = 10, 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def render_film(trial: TrialResult, own_floors: Mapping[str, Pixels]) -> bytes:
     recording = trial.recording
     viewport = _choose_viewport(recording)
     ground = _draw_ground(recording, own_floors.get(recording.background), viewport)
-    speed = max(1, math.ceil(recording.end_t * 1000 / FRAME_MILLISECONDS / (MOST_FRAMES - 1)))
+    speed = max(1, math.ceil(recording.end_t * 1000 / FRAME_MILLISECONDS / (MAX_FRAMES - 1)))
     palette = _build_palette(_draw_frames(trial, ground.copy(), viewport, speed, (0.0, recording.end_t)))
     moments = [*np.arange(0, recording.end_t, FRAME_MILLISECONDS / 1000 * speed).tolist(), recording.end_t]
     frames = (
@@ -271,11 +271,11 @@ class _RobotFrame:
     """Converts a robot's own points to the frame: x to its right, y forward, mm."""
 
     pose: Pose
-    sight: _Viewport
+    viewport: _Viewport
 
     def at(self, right: float, forward: float) -> Point:
         cosine, sine = math.cos(math.radians(self.pose.heading)), math.sin(math.radians(self.pose.heading))
-        return self.sight.at(
+        return self.viewport.at(
             self.pose.x + forward * cosine + right * sine, self.pose.y + forward * sine - right * cosine
         )
 
@@ -357,15 +357,15 @@ class _Caption:
         trial_data = trial_to_json(trial, Sources())
         texts = [*trial_data["events"], *trial_data["messages"]]
         self._texts = sorted(texts, key=lambda text: float(text["t"]))
-        self._moments = [float(text["t"]) for text in self._texts]
-        self._count, self._since = 0, 0
+        self._times = [float(text["t"]) for text in self._texts]
+        self._count, self._start_frame = 0, 0
 
     def at(self, t: float, frame: int) -> tuple[str, str]:
         """Return the text and its colour. Frames must be requested in order."""
-        count = bisect_right(self._moments, t + 1e-6)
-        if count > self._count and (not self._count or frame - self._since >= _SHORTEST):
-            self._count, self._since = count, frame
-        if not self._count or frame - self._since > _LONGEST:
+        count = bisect_right(self._times, t + 1e-6)
+        if count > self._count and (not self._count or frame - self._start_frame >= _MIN_CAPTION_FRAMES):
+            self._count, self._start_frame = count, frame
+        if not self._count or frame - self._start_frame > _MAX_CAPTION_FRAMES:
             return "", INK
         return _format_caption(self._texts[self._count - 1])
 

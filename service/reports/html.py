@@ -198,7 +198,7 @@ def render_replay_page(replay: Mapping[str, Any], language: Language = ENGLISH) 
 
 
 def render_replay_section(document: bytes, language: Language = ENGLISH) -> Markup:
-    """Return a ``packed`` replay as a part of a page that has the style and script of reports."""
+    """Return a compressed replay as a part of a page that has the style and script of reports."""
     encoded_replay = Markup(base64.b64encode(document).decode("ascii"))
     return render_part("replay_section.html", language, replay=encoded_replay, words=translate_labels(language))
 

@@ -57,5 +57,5 @@ def describe_reach(message: Message, language: Language = ENGLISH) -> str:
 
 
 def describe_loss_fully(message: Message, language: Language = ENGLISH) -> str:
-    """Describe the loss as ``befell`` does, with the distance or angle."""
+    """Describe the loss like ``describe_loss``, with the distance or angle."""
     return ", ".join(filter(None, (describe_loss(message, language), describe_reach(message, language))))

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from submissions.submission import Submission
 
 #: The longest name within a file name, in bytes. A file system allows 255 in total.
-_MOST_BYTES = 80
+_MAX_BYTES = 80
 
 
 def build_file_stem(student: str, assignment: str = "") -> str:
@@ -37,7 +37,7 @@ def build_file_stem(student: str, assignment: str = "") -> str:
     the stem is for the student's files of that assignment.
     """
     safe_name = re.sub(r"[^\w.-]+", "-", student.replace("-", "--").replace(" ", "-"))
-    stem = safe_name.encode()[:_MOST_BYTES].decode(errors="ignore").strip("-.")
+    stem = safe_name.encode()[:_MAX_BYTES].decode(errors="ignore").strip("-.")
     restored_name = re.sub("--?", lambda dashes: "-" if dashes[0] == "--" else " ", stem)
     if restored_name != student or stem.casefold() == "index":
         stem = f"{stem or 'report'}~{hashlib.sha256(student.encode('utf-8', 'surrogatepass')).hexdigest()[:16]}"

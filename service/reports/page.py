@@ -26,7 +26,7 @@ from service.reports.plots.grade_plots import group_same_answers, list_plots
 from service.reports.plots.message_counts import count_messages, describe_message_counts
 from service.reports.plots.own_diagrams import OwnDiagram, list_own_diagrams
 from service.reports.plots.plot import Plot
-from service.reports.plots.sequence import MOST_CALL_STEPS, Step, iterate_inner_steps
+from service.reports.plots.sequence import MAX_CALL_STEPS, Step, iterate_inner_steps
 from service.reports.recognition_table import ClassLine, RecognitionTable, build_recognition_table
 from service.reports.replay.trial import compute_loss_time, format_moment_link
 from service.reports.robots import collect_messages, format_party_name, iterate_robots
@@ -47,8 +47,8 @@ from submissions.diagram_cells import read_diagrams
 from submissions.submission import Submission
 
 _TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
-_MOST_MESSAGES = 40
-_MOST_TRIALS = 250
+_MAX_MESSAGES = 40
+_MAX_TRIALS = 250
 _NO_MOVEMENT = translatable("the robot did not move, so its path and sensors are not drawn")
 PROCESS_LIMITS = "process limits only"
 
@@ -182,7 +182,7 @@ def build_page(view: View, submission: Submission | None = None, replayed_trials
     """Return the content of a report from a reader's view. ``replayed_trials`` are the trials of its replay, from 1."""
     grade, language = view.grade, view.language
     plots = list_plots(grade, language)
-    trial_lines = tuple(_build_trial_line(trial, language) for trial in grade.trials[:_MOST_TRIALS])
+    trial_lines = tuple(_build_trial_line(trial, language) for trial in grade.trials[:_MAX_TRIALS])
     faults = group_faults(grade, submission, language=language)
     diagnosis = diagnose(grade, submission, language)
     criteria = tuple(
@@ -306,8 +306,8 @@ def _build_scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language:
         where=f": {format_trial_name(trial, language, 80)}" if has_several_trials else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=build_timeline(recording, language),
-        messages=lines[:_MOST_MESSAGES],
-        more_messages=max(0, len(lines) - _MOST_MESSAGES),
+        messages=lines[:_MAX_MESSAGES],
+        more_messages=max(0, len(lines) - _MAX_MESSAGES),
         talk=describe_message_counts(count_messages(recording), language),
         outputs=tuple(each for each in _collect_outputs(recording, language) if each.text),
         notes=(
@@ -356,7 +356,7 @@ def _build_message_lines(recording: Recording, language: Language) -> Iterator[M
         kind = "wrong" if is_lost or loss_text else ""
         yield MessageLine(f"{message.t:.2f}", sender, abbreviate_message(message.text, 240), arrived, kind, is_lost)
         if recording.partner is None:
-            steps = itertools.islice(iterate_inner_steps(recording, index), MOST_CALL_STEPS)
+            steps = itertools.islice(iterate_inner_steps(recording, index), MAX_CALL_STEPS)
             yield from (_build_inner_line(step, language) for step in steps)
 
 

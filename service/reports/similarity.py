@@ -19,7 +19,7 @@ from service.reports.html import render_page, render_part
 from service.reports.view import SimilarityView
 from service.similarity.behaviour import Aspect, SharedBehaviour
 from service.similarity.pairs import Similarity, SimilarPair
-from service.similarity.similar_sources import FEWEST_TOKENS, SimilarSources, Stretch
+from service.similarity.similar_sources import MIN_TOKENS, SimilarSources, Stretch
 
 #: The aspects in which two students' trials can be the same.
 _ASPECTS: Mapping[Aspect, str] = MappingProxyType(
@@ -29,7 +29,7 @@ _ASPECTS: Mapping[Aspect, str] = MappingProxyType(
 SourceReader = Callable[[str, str, str], str]
 
 #: Limits of a pair's stretches, of a stretch's lines, and of a line's characters.
-_MOST_STRETCHES, _MOST_LINES, _MOST_OF_LINE = 12, 60, 160
+_MAX_STRETCHES, _MAX_LINES, _MAX_LINE_LENGTH = 12, 60, 160
 
 
 def describe_similarity(similarity: Similarity, language: Language = ENGLISH) -> str:
@@ -58,7 +58,7 @@ def describe_similarity(similarity: Similarity, language: Language = ENGLISH) ->
             "%(count)s students have too little code to compare (fewer than %(tokens)s tokens), so only the "
             "recordings are compared",
             len(similarity.too_short),
-            tokens=FEWEST_TOKENS,
+            tokens=MIN_TOKENS,
         )
     if similarity.not_compared:
         sentence += "; " + language.say("%(count)s less similar pairs were not compared", count=similarity.not_compared)
@@ -155,11 +155,11 @@ def _build_source(
             strict=True,
         )
     ]
-    sorted_stretches = sorted(similar_sources.stretches[:_MOST_STRETCHES], key=lambda stretch: stretch.lines)
+    sorted_stretches = sorted(similar_sources.stretches[:_MAX_STRETCHES], key=lambda stretch: stretch.lines)
     return {
         "heads": headings,
         "stretches": [list(_align_lines(stretch, *line_lists)) for stretch in sorted_stretches],
-        "more": len(similar_sources.stretches) - _MOST_STRETCHES,
+        "more": len(similar_sources.stretches) - _MAX_STRETCHES,
     }
 
 
@@ -174,10 +174,10 @@ def _align_lines(
 def _number_lines(lines: Sequence[str], span: tuple[int, int]) -> list[tuple[str, str]]:
     first_number, last_number = span
     numbered_lines = [
-        (str(number), "    " * _measure_indentation(text) + to_one_line(text, _MOST_OF_LINE))
-        for number, text in enumerate(lines[first_number - 1 : last_number][:_MOST_LINES], first_number)
+        (str(number), "    " * _measure_indentation(text) + to_one_line(text, _MAX_LINE_LENGTH))
+        for number, text in enumerate(lines[first_number - 1 : last_number][:_MAX_LINES], first_number)
     ]
-    return numbered_lines if last_number - first_number < _MOST_LINES else [*numbered_lines, ("", "…")]
+    return numbered_lines if last_number - first_number < _MAX_LINES else [*numbered_lines, ("", "…")]
 
 
 def _measure_indentation(line: str) -> int:

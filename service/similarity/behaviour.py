@@ -22,7 +22,7 @@ from sim.recording_values import collect_faults
 
 Aspect = Literal["path", "messages", "faults"]
 #: The smallest number of active students in a trial for which rarity can be judged.
-FEWEST_STUDENTS = 8
+MIN_STUDENTS = 8
 #: The largest fraction of them that may share rare behaviour; always at least two.
 RARE_FRACTION = 0.1
 
@@ -110,7 +110,7 @@ def find_shared_behaviour(behaviours: Mapping[str, Behaviour]) -> dict[tuple[str
         students = len(active[trial])
         max_students = max(2, RARE_FRACTION * students)
         for group in groups.values():
-            if students >= FEWEST_STUDENTS and 2 <= len(group) <= max_students:
+            if students >= MIN_STUDENTS and 2 <= len(group) <= max_students:
                 for pair in combinations(group, 2):
                     shared_behaviour[pair].append(SharedBehaviour(trial, aspect, len(group), students))
     return {pair: tuple(same) for pair, same in shared_behaviour.items()}

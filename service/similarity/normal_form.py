@@ -11,7 +11,7 @@ from keyword import iskeyword
 from typing import TypeAlias
 
 #: The deepest nesting of brackets; statements beyond it stay unchanged.
-_DEEPEST_NESTING = 20
+_MAX_NESTING = 20
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 #: From the weakest binding on; for each level, whether operands may be swapped.
 _LEVELS: tuple[tuple[frozenset[str], bool], ...] = (
@@ -72,7 +72,7 @@ def _group_brackets(statement: Sequence[Word]) -> list[_Item] | None:
             return None
         else:
             inner_items.append(word)
-        if len(open_groups) > _DEEPEST_NESTING:
+        if len(open_groups) > _MAX_NESTING:
             return None
     return None if open_groups else items
 

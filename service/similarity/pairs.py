@@ -13,7 +13,7 @@ from service.similarity.similar_sources import SimilarSources, Source, compare_s
 
 #: The fraction and least number of trials with the same path that make a pair without similar sources. A winding path
 #: counts twice. Equal messages make no pair: if few are right, those few send the same.
-SAME_PART, FEWEST_TRIALS = 0.5, 2
+SAME_PART, MIN_TRIALS = 0.5, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,4 +77,4 @@ def compare_submissions(
 def _has_enough_trials(shared_behaviour: Sequence[SharedBehaviour], behaviours: Sequence[Behaviour]) -> bool:
     paths = [each.trial for each in shared_behaviour if each.aspect == "path"]
     weight = sum(2 if trial in behaviours[0].winding else 1 for trial in paths)
-    return weight >= FEWEST_TRIALS and len(paths) >= SAME_PART * max(each.trials for each in behaviours)
+    return weight >= MIN_TRIALS and len(paths) >= SAME_PART * max(each.trials for each in behaviours)

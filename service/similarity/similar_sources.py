@@ -25,17 +25,17 @@ from service.similarity.winnowing import (
 #: The fraction of a source's own tokens found in another that makes the two similar.
 SIMILARITY_THRESHOLD = 0.6
 #: The least number of own tokens, about ten lines. Shorter sources are written alike by everyone.
-FEWEST_TOKENS = 60
+MIN_TOKENS = 60
 #: Code in at least this fraction and number of the students' work is common: from the docs, or a hint in class.
-COMMON_PART, FEWEST_IN_COMMON = 1 / 3, 5
+COMMON_PART, MIN_IN_COMMON = 1 / 3, 5
 #: A file shared by more than this fraction of the students is not a student's own.
 NEARLY_ALL = 2 / 3
 #: The number of pairs compared, those with most in common. Hundreds of copies of one large file make thousands of
 #: pairs.
-MOST_PAIRS = 2000
+MAX_PAIRS = 2000
 #: The number of places of a gram at which a stretch may continue.
-_MOST_PLACES = 8
-_MOST_STRETCHES = 50
+_MAX_PLACES = 8
+_MAX_STRETCHES = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +119,9 @@ def compare_sources(
     indexed_sources = [
         _index_source(source, own, excluded_grams) for source, own in zip(sources, all_grams, strict=True)
     ]
-    long_sources = [each for each in indexed_sources if each.own >= FEWEST_TOKENS]
+    long_sources = [each for each in indexed_sources if each.own >= MIN_TOKENS]
     candidates = list(_find_candidates(long_sources, cutoff))
-    chosen_pairs = nlargest(MOST_PAIRS, candidates, key=lambda candidate: candidate[0])
+    chosen_pairs = nlargest(MAX_PAIRS, candidates, key=lambda candidate: candidate[0])
     compared_pairs = (_compare_pair(one, other) for _, one, other in chosen_pairs)
     similar_pairs = sorted(
         (each for each in compared_pairs if each.share >= cutoff),
@@ -147,9 +147,9 @@ def _group_same_files(
     students: dict[bytes, set[str]] = {}
     for source, grams in zip(sources, all_grams, strict=True):
         size = len(source.tokens)
-        if size - int(mark_covered_tokens(np.isin(grams, given_grams), size).sum()) >= FEWEST_TOKENS:
+        if size - int(mark_covered_tokens(np.isin(grams, given_grams), size).sum()) >= MIN_TOKENS:
             students.setdefault(grams.tobytes(), set()).add(source.student)
-    max_students = max(FEWEST_IN_COMMON, NEARLY_ALL * len({source.student for source in sources}))
+    max_students = max(MIN_IN_COMMON, NEARLY_ALL * len({source.student for source in sources}))
     groups = {tuple(sorted(group)) for group in students.values() if 1 < len(group) <= max_students}
     return tuple(sorted(groups, key=lambda group: (-len(group), group)))
 
@@ -160,7 +160,7 @@ def _find_common_grams(sources: Sequence[Source], all_grams: Sequence[NDArray[np
         student_grams.setdefault(source.student, []).append(grams)
     unique_grams = [np.unique(np.concatenate(own)) for own in student_grams.values()]
     all_unique, counts = np.unique(np.concatenate([np.empty(0, np.uint64), *unique_grams]), return_counts=True)
-    return all_unique[counts >= max(FEWEST_IN_COMMON, COMMON_PART * len(student_grams))]
+    return all_unique[counts >= max(MIN_IN_COMMON, COMMON_PART * len(student_grams))]
 
 
 def _index_source(source: Source, grams: NDArray[np.uint64], excluded_grams: NDArray[np.uint64]) -> _IndexedSource:
@@ -236,12 +236,12 @@ def _find_stretches(
         if start >= end:
             runs = [
                 (_measure_run(first_grams, second_grams, start, at), -at)
-                for at in places[first_grams[start]][:_MOST_PLACES]
+                for at in places[first_grams[start]][:_MAX_PLACES]
             ]
             length, negated_start = max(runs)
             stretches.append((start, -negated_start, length))
             end = start + length + GRAM - 1
-    longest = sorted(stretches, key=lambda each: (-each[2], each[0]))[:_MOST_STRETCHES]
+    longest = sorted(stretches, key=lambda each: (-each[2], each[0]))[:_MAX_STRETCHES]
     return tuple(_build_stretch(first_source, second_source, each) for each in longest)
 
 

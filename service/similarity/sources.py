@@ -17,7 +17,7 @@ from submissions.source_text import decode_source
 from submissions.submission import Submission
 
 #: The number of files that are read per submission. Further files are not compared.
-MOST_FILES = 20
+MAX_FILES = 20
 
 
 def extract_sources(submission: Submission) -> Mapping[str, str]:
@@ -29,7 +29,7 @@ def extract_sources(submission: Submission) -> Mapping[str, str]:
     if submission.notebook is not None:
         texts[submission.notebook.name] = "\n\n".join(cell.source for cell in submission.notebook.cells)
     texts |= {name: code.text for name, code in submission.python_files.items() if name not in texts}
-    return dict(list(texts.items())[:MOST_FILES])
+    return dict(list(texts.items())[:MAX_FILES])
 
 
 def collect_given_code(assignment: Assignment, path: Path | None = None) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from service.similarity.normal_form import Word, normalise_statement
 
 #: The number of tokens read per file. A program of a thousand lines has about 10 000.
-MOST_TOKENS = 20_000
+MAX_TOKENS = 20_000
 
 #: Every branch matches or fails without backtracking. An unclosed text ends with its line or the file.
 _TOKEN = re.compile(
@@ -86,7 +86,7 @@ def _split_statements(source: str) -> Iterator[list[_RawToken]]:
             depth = max(0, depth + (text in _OPENING) - (text in _CLOSING))
             count += 1
         line += text.count("\n")
-        if count >= MOST_TOKENS:
+        if count >= MAX_TOKENS:
             break
     yield statement
 

@@ -16,7 +16,7 @@ from service.similarity.tokens import Tokens
 #: The number of tokens in a gram, and of neighbours from which one is selected.
 GRAM, WINDOW = 8, 3
 #: The least number of different tokens in a significant gram; ``[number], [number]`` has four.
-FEWEST_DIFFERENT_TOKENS = 5
+MIN_DIFFERENT_TOKENS = 5
 
 _FACTOR, _MIX = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9)
 
@@ -39,7 +39,7 @@ def mark_varied_grams(tokens: Tokens) -> NDArray[np.bool_]:
         return np.empty(0, np.bool_)
     sorted_windows = np.sort(sliding_window_view(tokens.numbers, GRAM), axis=1)
     steps = np.count_nonzero(sorted_windows[:, 1:] != sorted_windows[:, :-1], axis=1)
-    return np.asarray(steps + 1 >= FEWEST_DIFFERENT_TOKENS)
+    return np.asarray(steps + 1 >= MIN_DIFFERENT_TOKENS)
 
 
 def select_fingerprints(numbers: NDArray[np.uint64]) -> NDArray[np.int64]:

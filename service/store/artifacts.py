@@ -20,7 +20,7 @@ from sim.errors import HostError
 
 CAP_BYTES = 64_000_000
 #: Number of files fetched at once.
-_AT_ONCE = 20
+_CHUNK_SIZE = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def load_each_files(
         .where(Job.id.in_(job_ids))
         .order_by(Job.id, Artifact.name)
     )
-    rows = session.execute(query, execution_options={"yield_per": _AT_ONCE})
+    rows = session.execute(query, execution_options={"yield_per": _CHUNK_SIZE})
     for job_id, job_rows in groupby(rows, key=lambda row: row[0]):
         # A job without such files yields one row without a file.
         files = [(name, media_type, sha256, data) for _, name, media_type, sha256, data in job_rows if name is not None]

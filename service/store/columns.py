@@ -35,7 +35,7 @@ def make_storable(text: str) -> str:
 
 
 def make_json_storable(value: Json) -> Json:
-    """Apply ``storable`` to every string in a JSON value. Raises ValueError for infinite floats and NaN."""
+    """Apply ``make_storable`` to every string in a JSON value. Raises ValueError for infinite floats and NaN."""
     if isinstance(value, str):
         return make_storable(value)
     if isinstance(value, float) and not math.isfinite(value):

@@ -24,7 +24,7 @@ from service.store.web_tables import Delivery, OpenAssignment, Webhook
 #: Time after which a delivery is given up.
 RETRY_PERIOD = timedelta(days=1)
 _FIRST_WAIT = timedelta(seconds=15)
-_LONGEST_WAIT = timedelta(hours=2)
+_MAX_WAIT = timedelta(hours=2)
 #: Time to send a claimed delivery, before it can be claimed again.
 _LEASE = timedelta(minutes=2)
 _RETENTION = timedelta(days=30)
@@ -66,7 +66,7 @@ def emit_grade_copied(session: Session, job_id: str) -> None:
 
 
 def emit_job_ended(session: Session, job_id: str) -> None:
-    """Handle a job that ended without a grade: report its batch as finished if this was the last one."""
+    """Report a batch as finished if its last job ended without a grade."""
     if hooks := _load_job_webhooks(session, job_id):
         _add_batch_finished(session, hooks, session.scalar(select(Job.batch_id).where(Job.id == job_id)))
 
@@ -87,9 +87,9 @@ def emit_superseded_batches(session: Session, submissions: Select[int], cancelle
         emit_batch_finished(session, str(batch_id))
 
 
-def emit_grades_published(session: Session, course_id: int, **told: object) -> None:
+def emit_grades_published(session: Session, course_id: int, **event_data: object) -> None:
     """Report that grades were released to their students."""
-    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.GRADES_PUBLISHED, told)
+    _add_deliveries(session, _load_course_webhooks(session, course_id), WebhookEvent.GRADES_PUBLISHED, event_data)
 
 
 def emit_appeal_opened(session: Session, submission_id: int, appeal_id: int) -> None:
@@ -119,53 +119,62 @@ def claim_deliveries(store: Store, limit: int) -> list[ClaimedDelivery]:
         session.execute(
             delete(Delivery).where(or_(Delivery.delivered_at < current_time - _RETENTION, and_(*is_abandoned)))
         )
-        chosen = select(Webhook).where(Webhook.id.in_(_choose_webhooks(session, current_time, limit)))
-        hooks = session.scalars(chosen.order_by(Webhook.id).with_for_update(skip_locked=True, key_share=True)).all()
+        chosen_query = select(Webhook).where(Webhook.id.in_(_choose_webhooks(session, current_time, limit)))
+        hooks = session.scalars(
+            chosen_query.order_by(Webhook.id).with_for_update(skip_locked=True, key_share=True)
+        ).all()
         # Another process may have claimed a delivery of a webhook before it was locked here.
-        busy = _load_busy_webhooks(session, current_time)
+        busy_webhooks = _load_busy_webhooks(session, current_time)
         return [
             claimed_deliveries
             for hook in hooks
-            if hook.id not in busy
+            if hook.id not in busy_webhooks
             and (claimed_deliveries := _claim_oldest_delivery(session, hook, current_time)) is not None
         ]
 
 
-def _choose_webhooks(session: Session, at: datetime, most: int) -> list[str]:
-    """Return up to ``most`` webhooks with due deliveries and without claimed ones."""
-    busy = _load_busy_webhooks(session, at)
+def _choose_webhooks(session: Session, current_time: datetime, limit: int) -> list[str]:
+    """Return up to ``limit`` webhooks with due deliveries and without claimed ones."""
+    busy = _load_busy_webhooks(session, current_time)
     query = select(Webhook.id, Webhook.course_id).join(Delivery, Delivery.webhook_id == Webhook.id)
-    query = query.where(*_is_due(at), Webhook.id.not_in(busy)).group_by(Webhook.id, Webhook.course_id)
+    query = query.where(*_match_due(current_time), Webhook.id.not_in(busy)).group_by(Webhook.id, Webhook.course_id)
     claimed_by_course = Counter(busy.values())
     ranked = []
     for webhook_id, course_id in session.execute(query.order_by(func.min(Delivery.due_at), Webhook.id)):
         ranked.append((claimed_by_course[course_id], webhook_id))
         claimed_by_course[course_id] += 1
-    return [webhook_id for _, webhook_id in sorted(ranked, key=lambda each: each[0])[:most]]
+    return [webhook_id for _, webhook_id in sorted(ranked, key=lambda each: each[0])[:limit]]
 
 
-def _load_busy_webhooks(session: Session, at: datetime) -> dict[str, int]:
+def _load_busy_webhooks(session: Session, current_time: datetime) -> dict[str, int]:
     """Return the webhooks with a claimed delivery, with their courses."""
     # A delivery that waits for its next attempt has the error of the previous one.
-    claimed = (Delivery.delivered_at.is_(None), Delivery.due_at > at, Delivery.attempts > 0, Delivery.error.is_(None))
+    is_claimed = (
+        Delivery.delivered_at.is_(None),
+        Delivery.due_at > current_time,
+        Delivery.attempts > 0,
+        Delivery.error.is_(None),
+    )
     query = select(Webhook.id, Webhook.course_id).join(Delivery, Delivery.webhook_id == Webhook.id)
-    return dict(session.execute(query.where(*claimed)).all())
+    return dict(session.execute(query.where(*is_claimed)).all())
 
 
-def _claim_oldest_delivery(session: Session, hook: Webhook, at: datetime) -> ClaimedDelivery | None:
-    oldest = select(Delivery).where(*_is_due(at), Delivery.webhook_id == hook.id)
-    delivery = session.scalar(oldest.order_by(Delivery.due_at, Delivery.id).limit(1))
+def _claim_oldest_delivery(session: Session, hook: Webhook, current_time: datetime) -> ClaimedDelivery | None:
+    oldest_query = select(Delivery).where(*_match_due(current_time), Delivery.webhook_id == hook.id)
+    delivery = session.scalar(oldest_query.order_by(Delivery.due_at, Delivery.id).limit(1))
     if delivery is None:
         return None
     attempt = delivery.attempts + 1
-    mine = Delivery.id == delivery.id
-    session.execute(update(Delivery).where(mine).values(attempts=attempt, due_at=at + _LEASE, error=None))
+    is_this_delivery = Delivery.id == delivery.id
+    session.execute(
+        update(Delivery).where(is_this_delivery).values(attempts=attempt, due_at=current_time + _LEASE, error=None)
+    )
     return ClaimedDelivery(
         delivery.id, hook.url, hook.secret, delivery.event, delivery.payload, delivery.made_at, attempt
     )
 
 
-def _is_due(at: datetime) -> tuple[ColumnElement[bool], ...]:
+def _match_due(at: datetime) -> tuple[ColumnElement[bool], ...]:
     return (Delivery.delivered_at.is_(None), Delivery.due_at <= at)
 
 
@@ -180,7 +189,7 @@ def record_delivery(store: Store, delivery: ClaimedDelivery) -> None:
 @retry_conflicts
 def record_failure(store: Store, delivery: ClaimedDelivery, error: str) -> None:
     """Record that a delivery failed: it is retried later, or given up after a day."""
-    delay = min(_FIRST_WAIT * 2 ** min(delivery.attempt - 1, 20), _LONGEST_WAIT)
+    delay = min(_FIRST_WAIT * 2 ** min(delivery.attempt - 1, 20), _MAX_WAIT)
     with store.transaction() as session:
         retry_at = now(session) + delay
         due_at = retry_at if retry_at < delivery.made_at + RETRY_PERIOD else None

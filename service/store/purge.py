@@ -35,7 +35,7 @@ _TEMPORARY = MetaData()
 #: Ids of submissions and enrolments to remove; there may be more than a statement accepts as parameters.
 _GOING = Table("going", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _LEAVING = Table("leaving", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
-_AT_ONCE = 500
+_CHUNK_SIZE = 500
 _ERASED = "erased"
 _going = select(_GOING.c.id)
 _leaving = select(_LEAVING.c.id)
@@ -204,9 +204,9 @@ def _delete_marked(session: Session) -> None:
     _sign_out_leaving(session)
     session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
     enrolled_ids = select(Enrolment.person_id)
-    for start in range(0, len(person_ids), _AT_ONCE):
+    for start in range(0, len(person_ids), _CHUNK_SIZE):
         is_unenrolled = (
-            Person.id.in_(person_ids[start : start + _AT_ONCE]),
+            Person.id.in_(person_ids[start : start + _CHUNK_SIZE]),
             Person.id.not_in(enrolled_ids),
             ~Person.operator,
         )

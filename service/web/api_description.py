@@ -10,9 +10,10 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from service.web.api_routes import KEY_HEADER, LONGEST_KEY
-from service.web.request_bodies import LARGEST_FORM, MEGABYTE
+from service.web.api_routes import KEY_HEADER, MAX_KEY_LENGTH
+from service.web.request_bodies import MAX_FORM_BYTES, MEGABYTE
 
+_MAX_FORM_MB = MAX_FORM_BYTES // MEGABYTE
 _DESCRIPTION = f"""
 The API covers all functions of the pages.
 
@@ -25,7 +26,7 @@ has the permissions of its owner, limited to its scopes. Objects that the owner 
 
 **Errors** are `application/problem+json`, with a message in `detail`.
 
-**Limits**: {LARGEST_FORM // MEGABYTE} MB for a request that is not an upload, and a number of calls per minute for each
+**Limits**: {_MAX_FORM_MB} MB for a request that is not an upload, and a number of calls per minute for each
 token. Further calls return 429 with `Retry-After`.
 
 Timestamps are ISO 8601 with a time zone, and marks are numbers. Durations are in seconds, lengths in millimetres, and
@@ -70,7 +71,7 @@ _KEY_PARAMETER = {
     "in": "header",
     "required": False,
     "description": "Any unique text. Requests with the same key run only once.",
-    "schema": {"type": "string", "minLength": 1, "maxLength": LONGEST_KEY, "pattern": "^[ -~]+$"},
+    "schema": {"type": "string", "minLength": 1, "maxLength": MAX_KEY_LENGTH, "pattern": "^[ -~]+$"},
 }
 
 

@@ -33,9 +33,9 @@ from sim.readers.reader_errors import UnreadableDataError
 
 _log = structlog.get_logger(__name__)
 KEY_HEADER = "idempotency-key"
-LONGEST_KEY = 200
+MAX_KEY_LENGTH = 200
 #: Maximum number of arrays, objects and their entries in a JSON body.
-_MOST_VALUES = 20_000
+_MAX_VALUES = 20_000
 #: For routes without an idempotency key: they change nothing, or return a secret that must not be stored.
 NO_KEY: Mapping[str, Any] = MappingProxyType({"x-no-key": True})
 _Item = TypeVar("_Item")
@@ -115,7 +115,7 @@ class ApiRequest(Request):
         """Return the parsed body. Raises HTTPException 422 if it is invalid or too complex."""
         if not hasattr(self, "_json"):
             try:
-                self._json = await run_in_threadpool(read_json, await self.body(), most_values=_MOST_VALUES)
+                self._json = await run_in_threadpool(read_json, await self.body(), max_values=_MAX_VALUES)
             except UnreadableDataError as error:
                 raise HTTPException(422, f"The JSON of the body cannot be read: {error}.") from None
         return self._json
@@ -144,8 +144,8 @@ def api_router(tag: str) -> APIRouter:
 
 
 async def _run_once(request: Request, key: str, handle_request: Callable[[Request], Awaitable[Response]]) -> Response:
-    if not 0 < len(key) <= LONGEST_KEY or not key.isascii() or not key.isprintable():
-        raise HTTPException(422, f"Idempotency-Key: expected from 1 to {LONGEST_KEY} printable characters.")
+    if not 0 < len(key) <= MAX_KEY_LENGTH or not key.isascii() or not key.isprintable():
+        raise HTTPException(422, f"Idempotency-Key: expected from 1 to {MAX_KEY_LENGTH} printable characters.")
     context: WebContext = request.app.state.context
     caller = await run_in_threadpool(require_caller, request, context)
     # The role is part of the key: after a change of role, the request runs again and is checked again.

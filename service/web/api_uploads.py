@@ -17,10 +17,10 @@ from starlette.exceptions import HTTPException
 from submissions.raw_files import MAX_FILES, MAX_TOTAL_BYTES, MEGABYTE, UploadedFile
 
 #: Maximum size of each kind of upload. The readers of the files limit their contents.
-LARGEST_BATCH = 200 * MEGABYTE
-LARGEST_ASSIGNMENT = 130 * MEGABYTE
-LARGEST_SUBMISSION = MAX_TOTAL_BYTES + 2 * MEGABYTE
-LARGEST_TABLE = 11 * MEGABYTE
+MAX_BATCH_BYTES = 200 * MEGABYTE
+MAX_ASSIGNMENT_BYTES = 130 * MEGABYTE
+MAX_SUBMISSION_BYTES = MAX_TOTAL_BYTES + 2 * MEGABYTE
+MAX_TABLE_BYTES = 11 * MEGABYTE
 _ZIP = "application/zip"
 _ZIP_TYPES = (_ZIP, "application/x-zip-compressed", "application/octet-stream")
 #: OpenAPI description of a body that is a zip.

@@ -12,7 +12,7 @@ from typing import NoReturn
 from service.web.http_errors import TranslatableHTTPException
 from sim.sentences import Sentence
 
-_MOST_KNOWN = 10_000
+_MAX_CLIENTS = 10_000
 
 
 class RateLimit:
@@ -23,22 +23,24 @@ class RateLimit:
         self._per_second = per_minute / 60
         self._clock = clock
         self._lock = threading.Lock()
-        self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # calls left, and the time of that count
+        self._remaining_calls: OrderedDict[str, tuple[float, float]] = (
+            OrderedDict()
+        )  # calls left, and the time of that count
 
     def spend(self, client_key: str) -> None:
         """Count one call of ``client_key``. Raises HTTPException 429 with ``Retry-After`` if the bucket is empty."""
         with self._lock:
-            remaining, current_time = self._compute_left(client_key)
-            self._left.pop(client_key, None)
-            self._left[client_key] = (max(0.0, remaining - 1), current_time)
-            if len(self._left) > _MOST_KNOWN:
-                self._left.popitem(last=False)
+            remaining, current_time = self._compute_remaining(client_key)
+            self._remaining_calls.pop(client_key, None)
+            self._remaining_calls[client_key] = (max(0.0, remaining - 1), current_time)
+            if len(self._remaining_calls) > _MAX_CLIENTS:
+                self._remaining_calls.popitem(last=False)
         if remaining < 1:
             self._refuse(remaining)
 
-    def _compute_left(self, client_key: str) -> tuple[float, float]:
+    def _compute_remaining(self, client_key: str) -> tuple[float, float]:
         current_time = self._clock()
-        remaining, last_time = self._left.get(client_key, (self._burst, current_time))
+        remaining, last_time = self._remaining_calls.get(client_key, (self._burst, current_time))
         return min(self._burst, remaining + (current_time - last_time) * self._per_second), current_time
 
     def _refuse(self, remaining: float) -> NoReturn:

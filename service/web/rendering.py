@@ -23,7 +23,7 @@ from service.web.access import Reader
 from service.web.date_times import format_current_offset, format_utc_offset
 from service.web.language import detect_language
 
-_LONGEST_TEXT = 20_000
+_MAX_TEXT_LENGTH = 20_000
 
 
 def render_page(
@@ -99,7 +99,7 @@ def _build_environment(language: Language) -> Environment:
 def _make_readable(value: object) -> object:
     """Make text readable. Jinja applies this function to every expression before escaping."""
     if isinstance(value, str) and not isinstance(value, Markup):
-        return to_display_text(value, _LONGEST_TEXT, lines=400)
+        return to_display_text(value, _MAX_TEXT_LENGTH, lines=400)
     return value
 
 

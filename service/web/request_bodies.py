@@ -31,9 +31,9 @@ from sim.sentences import Sentence
 
 MEGABYTE = 2**20
 #: Maximum size of a form or JSON body, for routes that declare no upload.
-LARGEST_FORM = MEGABYTE
+MAX_FORM_BYTES = MEGABYTE
 #: Maximum size for public routes: sign-in links and launches by learning platforms.
-_LARGEST_PUBLIC_BODY = 128 * 1024
+_MAX_PUBLIC_BODY_BYTES = 128 * 1024
 _PUBLIC_PATHS = frozenset({"/sign-in", "/language", "/lti/login", "/lti/launch"})
 _BODILESS_METHODS = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
 _UPLOAD_ATTRIBUTE = "robomark_upload"
@@ -57,7 +57,7 @@ class UploadLimit:
 
 
 def takes_upload(max_bytes: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
-    """Declare that an endpoint accepts bodies of up to ``max_bytes`` bytes. All others accept ``LARGEST_FORM``."""
+    """Declare that an endpoint accepts bodies of up to ``max_bytes`` bytes. All others accept ``MAX_FORM_BYTES``."""
 
     def declared(endpoint: _Endpoint) -> _Endpoint:
         setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(max_bytes, role))
@@ -86,9 +86,9 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, send)
             return
         upload, course = self._find_upload(scope)
-        max_bytes = LARGEST_FORM if upload is None else upload.most
+        max_bytes = MAX_FORM_BYTES if upload is None else upload.most
         if scope["path"] in _PUBLIC_PATHS:
-            max_bytes = _LARGEST_PUBLIC_BODY
+            max_bytes = _MAX_PUBLIC_BODY_BYTES
         request = Request(scope, receive)
         try:
             if scope["method"] not in _BODILESS_METHODS and scope["path"] not in _PUBLIC_PATHS:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from responders.sandbox.private_folders import create_locked_folder, remove_left_overs
+from responders.sandbox.private_folders import create_locked_folder, remove_stale_folders
 
 _PREFIX = "robomark-web-"
 #: Folders of earlier versions and of commands. They have no lock, so they are removed by age.
@@ -21,7 +21,7 @@ _OLD_SECONDS = 24 * 3600
 @contextlib.contextmanager
 def own_temporary_folder() -> Iterator[Path]:
     """Use a separate folder for all temporary files of this process, and remove folders left by other processes."""
-    remove_left_overs(_PREFIX)
+    remove_stale_folders(_PREFIX)
     _remove_old_folders()
     previous_folder = tempfile.gettempdir()
     folder, lock_descriptor = create_locked_folder(_PREFIX, 0o700)

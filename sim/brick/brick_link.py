@@ -17,7 +17,7 @@ Frame = dict[str, Any]
 SECOND = 3_000_000  # thirds of a microsecond
 READ = SECOND // 100
 #: Maximum time of a single wait; longer than any trial.
-MOST_UNITS = 10**15
+MAX_UNITS = 10**15
 FREE_READS = 100_000
 
 _WAITS = frozenset({"until", "until_said", "paid_motor"})
@@ -207,7 +207,7 @@ class Link:
         """Let the world move for this time in thirds of a microsecond, at most the maximum wait."""
         self._free = 0
         self._send_place()
-        self._wire.act(_pack(_WAIT, 0, 0, 0, min(units, MOST_UNITS)))
+        self._wire.act(_pack(_WAIT, 0, 0, 0, min(units, MAX_UNITS)))
         self._receive_answer()
 
 

@@ -189,10 +189,10 @@ def _draw_radial_gradient(inner_colour: Colour, outer_colour: Colour) -> Pixels:
 
 
 def _compute_radial_channel(squared_diameters: NDArray[np.int64], outer_level: int, inner_level: int) -> Pixels:
-    def darkness(quarter: int) -> int:
+    def compute_darkness(quarter: int) -> int:
         t = (math.sqrt(quarter) / 2 / (math.sqrt(2) * 1181)) ** (1 / 3)
         return inner_level - int(outer_level * t + inner_level * (1 - t))
 
     furthest = range(int(squared_diameters.max()) + 1)
-    starts = [bisect_left(furthest, step, key=darkness) for step in range(1, inner_level - outer_level + 1)]
+    starts = [bisect_left(furthest, step, key=compute_darkness) for step in range(1, inner_level - outer_level + 1)]
     return (inner_level - np.searchsorted(starts, squared_diameters, side="right")).astype(np.uint8)

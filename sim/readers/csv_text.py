@@ -1,6 +1,6 @@
 """CSV reader with a limit on the number of cells.
 
-After a row with broken quotes, ``records`` continues at the next line. A row may span at most ``MOST_LINES_OF_RECORD``
+After a row with broken quotes, ``records`` continues at the next line. A row may span at most ``MAX_LINES_OF_RECORD``
 lines.
 """
 
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 
-MOST_CELLS = 2_000_000
+MAX_CELLS = 2_000_000
 #: Maximum lines of a row of people or submissions. A longer row has an unmatched quotation mark.
-MOST_LINES_OF_RECORD = 20
+MAX_LINES_OF_RECORD = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ def read_rows(text: str, separator: str = ",") -> list[list[str]]:
     """Return all rows.
 
     Raises:
-        Unreadable: There are too many cells, or a cell is too long.
+        UnreadableDataError: There are too many cells, or a cell is too long.
     """
     _check_cell_count(text.count(separator) + text.count("\n"))
     try:
@@ -44,14 +44,14 @@ def read_records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
     """Yield the rows of ``lines``, which end with line feeds. After a broken row, continue at the next line.
 
     Raises:
-        Unreadable: There are too many cells.
+        UnreadableDataError: There are too many cells.
     """
     _check_cell_count(sum(line.count(separator) for line in lines) + len(lines))
     record_start = 0
 
     def iterate_lines(start: int) -> Iterator[str]:
         for number in range(start, len(lines)):
-            if number - record_start >= MOST_LINES_OF_RECORD:
+            if number - record_start >= MAX_LINES_OF_RECORD:
                 raise csv.Error("a row spans too many lines")
             yield lines[number]
 
@@ -69,5 +69,5 @@ def read_records(lines: Sequence[str], separator: str) -> Iterator[CsvRecord]:
 
 
 def _check_cell_count(cells: int) -> None:
-    if cells > MOST_CELLS:
-        raise TooManyValuesError("it has more than %(most)s cells", most=MOST_CELLS)
+    if cells > MAX_CELLS:
+        raise TooManyValuesError("it has more than %(most)s cells", most=MAX_CELLS)

@@ -14,9 +14,9 @@ from typing import Any
 
 from sim.readers.reader_errors import MAX_DEPTH, TooManyValuesError, UnreadableDataError, check_depth
 
-__all__ = ["MOST_VALUES", "JSONDecodeError", "read_json"]
+__all__ = ["MAX_VALUES", "JSONDecodeError", "read_json"]
 
-MOST_VALUES = 200_000
+MAX_VALUES = 200_000
 #: An unterminated string extends to the end of the text, which avoids a new search at each later quote.
 _STRINGS = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 
@@ -24,7 +24,7 @@ _STRINGS = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 def read_json(
     text: str | bytes,
     *,
-    most_values: int = MOST_VALUES,
+    max_values: int = MAX_VALUES,
     parse_constant: Callable[[str], Any] | None = None,
     strict: bool = True,
 ) -> Any:
@@ -32,14 +32,14 @@ def read_json(
 
     Raises:
         JSONDecodeError: The text is not JSON.
-        Unreadable: Parsing would take too much work.
+        UnreadableDataError: Parsing would take too much work.
     """
     if isinstance(text, bytes):
         try:
             text = text.decode("utf-8-sig")
         except UnicodeDecodeError:
             raise UnreadableDataError("it is not UTF-8") from None
-    _check_limits(text, most_values)
+    _check_limits(text, max_values)
     try:
         return json.loads(text, parse_constant=parse_constant, strict=strict)
     except JSONDecodeError:
@@ -53,11 +53,11 @@ def read_json(
         raise UnreadableDataError("it has a number that is too long") from None
 
 
-def _check_limits(text: str, most_values: int) -> None:
+def _check_limits(text: str, max_values: int) -> None:
     opened = text.count("[") + text.count("{")
-    if opened <= MAX_DEPTH and opened + text.count(",") <= most_values:
+    if opened <= MAX_DEPTH and opened + text.count(",") <= max_values:
         return
     structure = _STRINGS.sub("", text)
-    if structure.count(",") + structure.count("[") + structure.count("{") > most_values:
-        raise TooManyValuesError("it has more than %(most)s values", most=most_values)
+    if structure.count(",") + structure.count("[") + structure.count("{") > max_values:
+        raise TooManyValuesError("it has more than %(most)s values", most=max_values)
     check_depth(structure)

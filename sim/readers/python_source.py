@@ -10,19 +10,19 @@ import re
 
 from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
 
-MOST_TOKENS = 200_000
+MAX_TOKENS = 200_000
 _TOKEN = re.compile(r"\w++|[^\w\s]")
 
 
-def parse_module(text: str, most_tokens: int = MOST_TOKENS) -> ast.Module:
+def parse_module(text: str, max_tokens: int = MAX_TOKENS) -> ast.Module:
     """Parse a module and return its syntax tree.
 
     Raises:
         SyntaxError: The text is not Python.
-        Unreadable: Parsing would take too much work.
+        UnreadableDataError: Parsing would take too much work.
     """
-    if len(text) > most_tokens and sum(1 for _ in _TOKEN.finditer(text)) > most_tokens:
-        raise TooManyValuesError("it has more than %(most)s tokens", most=most_tokens)
+    if len(text) > max_tokens and sum(1 for _ in _TOKEN.finditer(text)) > max_tokens:
+        raise TooManyValuesError("it has more than %(most)s tokens", most=max_tokens)
     try:
         return ast.parse(text)
     except (RecursionError, MemoryError):

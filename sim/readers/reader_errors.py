@@ -22,7 +22,7 @@ class TooManyValuesError(UnreadableDataError):
 
 
 def check_depth(structure: str, deepest: int = MAX_DEPTH) -> None:
-    """Raise Unreadable if brackets in ``structure``, a text without strings, are nested deeper than ``deepest``.
+    """Raise UnreadableDataError if brackets are nested deeper than ``deepest``. ``structure`` contains no strings.
 
     Each pass removes all innermost pairs, so the number of passes is limited by the allowed depth.
     """

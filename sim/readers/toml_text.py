@@ -13,12 +13,12 @@ from typing import Any
 
 from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError, check_depth
 
-__all__ = ["MOST_KEY_PARTS", "TOMLDecodeError", "read_toml"]
+__all__ = ["MAX_KEY_PARTS", "TOMLDecodeError", "read_toml"]
 
-MOST_KEY_PARTS = 10
+MAX_KEY_PARTS = 10
 #: Reading a key, table or list takes up to 1 kB each.
-MOST_KEYS = 20_000
-MOST_VALUES = 200_000
+MAX_KEYS = 20_000
+MAX_VALUES = 200_000
 #: Strings and comments, matched from the start of the text as in TOML, so that only structure remains. An unterminated
 #: string extends to the end of the text or line, which avoids a new search at each later quote.
 _TEXTS = re.compile(
@@ -37,7 +37,7 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
 
     Raises:
         TOMLDecodeError: The text is not TOML.
-        Unreadable: Parsing would take too much work.
+        UnreadableDataError: Parsing would take too much work.
     """
     _check_structure(_TEXTS.sub(_make_placeholder, text))
     try:
@@ -54,7 +54,7 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
 
 
 def _check_numbers(value: object) -> None:
-    """Raise Unreadable for a number beyond TOML's 64 bits. Python cannot print numbers with thousands of digits."""
+    """Raise UnreadableDataError for a number over 64 bits, TOML's limit. Python cannot print very long numbers."""
     if isinstance(value, int) and value.bit_length() > 64:
         raise UnreadableDataError("it has a number that is too long")
     for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
@@ -70,11 +70,11 @@ def _check_structure(structure: str) -> None:
     parts = 0
     for dotted_key in _DOTTED.finditer(structure):
         dots = dotted_key[0].count(".")
-        if dots >= MOST_KEY_PARTS:
-            raise UnreadableDataError("it has a key of more than %(most)s parts", most=MOST_KEY_PARTS)
+        if dots >= MAX_KEY_PARTS:
+            raise UnreadableDataError("it has a key of more than %(most)s parts", most=MAX_KEY_PARTS)
         # One dot can be a decimal point.
         parts += dots if dots > 1 else 0
-    if structure.count("=") + structure.count("[") + structure.count("{") + parts > MOST_KEYS:
-        raise TooManyValuesError("it has more than %(most)s keys, tables and lists", most=MOST_KEYS)
-    if structure.count(",") > MOST_VALUES:
-        raise TooManyValuesError("it has more than %(most)s values", most=MOST_VALUES)
+    if structure.count("=") + structure.count("[") + structure.count("{") + parts > MAX_KEYS:
+        raise TooManyValuesError("it has more than %(most)s keys, tables and lists", most=MAX_KEYS)
+    if structure.count(",") > MAX_VALUES:
+        raise TooManyValuesError("it has more than %(most)s values", most=MAX_VALUES)

@@ -8,19 +8,19 @@ import yaml
 
 from sim.readers.reader_errors import MAX_DEPTH, TooManyValuesError, UnreadableDataError
 
-MOST_BYTES = 20_000_000
+MAX_BYTES = 20_000_000
 #: Parser events: values, and starts or ends of lists and tables.
-MOST_EVENTS = 500_000
+MAX_EVENTS = 500_000
 
 
 def read_yaml(data: bytes) -> Any:
     """Parse the text and return the document.
 
     Raises:
-        Unreadable: The text is not YAML (the message has the line), or parsing would take too much work.
+        UnreadableDataError: The text is not YAML (the message has the line), or parsing takes too much work.
     """
-    if len(data) > MOST_BYTES:
-        raise UnreadableDataError("it is larger than %(most)s MB", most=MOST_BYTES // 10**6)
+    if len(data) > MAX_BYTES:
+        raise UnreadableDataError("it is larger than %(most)s MB", most=MAX_BYTES // 10**6)
     try:
         _check_limits(data)
         return yaml.load(data, Loader=yaml.CBaseLoader)
@@ -38,5 +38,5 @@ def _check_limits(data: bytes) -> None:
         # libyaml recurses without a limit and would exhaust the stack.
         if depth > MAX_DEPTH:
             raise UnreadableDataError("it is nested too deeply")
-        if count > MOST_EVENTS:
-            raise TooManyValuesError("it has more than %(most)s values", most=MOST_EVENTS)
+        if count > MAX_EVENTS:
+            raise TooManyValuesError("it has more than %(most)s values", most=MAX_EVENTS)

@@ -41,15 +41,15 @@ _BROKEN = (
 
 
 @contextmanager
-def open_zip(source: BinaryIO, most_entries: int) -> Iterator[ZipFile]:
+def open_zip(source: BinaryIO, max_entries: int) -> Iterator[ZipFile]:
     """Open an archive as a context manager.
 
     Raises:
-        Unreadable: The data are not an archive, or there are more than ``most_entries`` entries. Entries of stored
+        UnreadableDataError: The data are not an archive or have more than ``max_entries`` entries. Entries of stored
             archives inside it count.
     """
-    if _count_entries(source) > most_entries:
-        raise TooManyValuesError("it has more than %(most)s files", most=most_entries)
+    if _count_entries(source) > max_entries:
+        raise TooManyValuesError("it has more than %(most)s files", most=max_entries)
     try:
         archive = ZipFile(source)
     except (*_BROKEN, OSError):
@@ -67,7 +67,7 @@ def read_entry_chunks(archive: ZipFile, info: ZipInfo) -> Iterator[bytes]:
     """Yield the content of an entry in chunks.
 
     Raises:
-        Unreadable: The entry is damaged or uses an unusual compression method.
+        UnreadableDataError: The entry is damaged or uses an unusual compression method.
     """
     if info.compress_type not in PLAIN_COMPRESSION:
         raise UnreadableDataError("it is compressed in an unusual way")

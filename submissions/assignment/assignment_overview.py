@@ -32,7 +32,7 @@ TOPICS: Mapping[str, str] = MappingProxyType(
 )
 _SENTENCE_ENDS = re.compile(r"(?<=[.!?]) (?=[A-Z])")
 _START_POSE_SENTENCE = re.compile(r"(The|This)( small)? robot |There are two robots")
-_LONGEST_SENTENCE = 200
+_MAX_SENTENCE_LENGTH = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def _choose_sentence(description: str) -> str:
     sentences = _SENTENCE_ENDS.split(" ".join(description.split()))
     instructions = (each for each in sentences if each.startswith("Write "))
     candidates = (each for each in sentences if not _START_POSE_SENTENCE.match(each))
-    return textwrap.shorten(next(instructions, next(candidates, sentences[0])), _LONGEST_SENTENCE, placeholder=" …")
+    return textwrap.shorten(next(instructions, next(candidates, sentences[0])), _MAX_SENTENCE_LENGTH, placeholder=" …")
 
 
 def _count_trials(scenario: Mapping[str, Any]) -> int:

@@ -19,7 +19,7 @@ from submissions.source_text import decode_source
 
 #: Value of ``second_program``: the second robot runs the program of the first.
 SAME = "same"
-_MOST = 8
+_MAX_AGENTS = 8
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 #: Names that a responder already uses, or that reports use with another meaning.
 _RESERVED_NAMES = frozenset({"robot", "program", "responder", "bridge", "host", "assignment", "msg", "eds"})
@@ -52,8 +52,8 @@ def read_agents(
 
 
 def _check_parts(table: Mapping[str, object], parts: PartsTable, problems: Problems) -> None:
-    if len(table) > _MOST:
-        problems.add(("agents",), f"agents has {len(table)} names, expected at most {_MOST}")
+    if len(table) > _MAX_AGENTS:
+        problems.add(("agents",), f"agents has {len(table)} names, expected at most {_MAX_AGENTS}")
     if parts.responder == "none" or parts.program == "none":
         problems.add(("agents",), "agents needs a robot with a responder, expected both in [parts]")
     elif "student" not in (parts.program, parts.responder):
@@ -75,14 +75,14 @@ def _read_source(
 def check_robots(document: Mapping[str, object], world: WorldTable, parts: PartsTable, problems: Problems) -> None:
     """Report missing programs or start poses of a robot, and settings for a robot that does not exist."""
     scenarios = list(filter_tables(document.get("scenario")))
-    linked = world.robots == 2 and parts.responder == "none"
+    is_linked = world.robots == 2 and parts.responder == "none"
     for number, raw in enumerate(scenarios):
         channel = raw.get("channel")
         link = channel.get("link") if isinstance(channel, dict) else None
-        if link == "between robots" and not linked:
+        if link == "between robots" and not is_linked:
             sentence = 'link is "between robots", expected robots = 2 in world and responder = "none" in parts with it'
             problems.add(("scenario", number, "channel", "link"), sentence)
-        if link == "infrared" and linked:
+        if link == "infrared" and is_linked:
             sentence = 'link is "infrared", to a beacon, but the robots talk to each other, expected "between robots"'
             problems.add(("scenario", number, "channel", "link"), sentence)
     if world.robots == 1:

@@ -18,7 +18,7 @@ from sim.errors import AssignmentError
 from sim.readers.toml_text import read_toml
 from submissions.assignment.schema import read_table
 
-_MOST = 100
+_MAX_PROBLEMS = 100
 Path = tuple[str | int, ...]
 
 _SPACE = " \t"
@@ -194,7 +194,7 @@ class Problems:
             AssignmentProblems: The number of mistakes exceeds its limit. A file can have one in every key.
         """
         self.found.append((find_nearest_line(self.lines, path), sentence))
-        if len(self.found) > _MOST:
+        if len(self.found) > _MAX_PROBLEMS:
             raise AssignmentProblems((*self.sorted(), f"{self.where}:1: may have more mistakes; checking stopped here"))
 
     def sorted(self) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from submissions.sweep import CONDITIONS
 T = TypeVar("T", bound=BaseModel)
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
 #: Maximum number of mistakes reported per table, because comparing them takes quadratic time.
-_MOST_PROBLEMS = 200
+_MAX_PROBLEMS = 200
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)
 
 
@@ -233,7 +233,7 @@ def read_table(schema: type[T], table: object) -> T | list[TableProblem]:
         # Pydantic's JSON mode is strict about types, but accepts a list for a tuple.
         return schema.model_validate_json(json.dumps(table, default=_encode_foreign_value), strict=True)
     except ValidationError as error:
-        errors = error.errors(include_url=False)[:_MOST_PROBLEMS]
+        errors = error.errors(include_url=False)[:_MAX_PROBLEMS]
         paths = [details["loc"] for details in errors]
         return [describe_problem(schema, details) for details in errors if not _is_consequence(details, paths)]
 

@@ -16,8 +16,8 @@ from submissions.strict_table import Entries
 
 #: x and y in mm, and the label.
 LabelledPlace = Annotated[tuple[float, float, str], Entries("[x, y, label]")]
-_MOST_PLACES = 10_000
-_MOST_CALLS = 1000
+_MAX_PLACES = 10_000
+_MAX_CALLS = 1000
 
 
 def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, ...]:
@@ -27,8 +27,8 @@ def read_places(name: str, files: Mapping[str, bytes]) -> tuple[LabelledPlace, .
         UsageError: The file or a row cannot be used. The message has the line.
     """
     rows = _read_csv_rows(name, files, "places", "x, y, label")
-    if len(rows) > _MOST_PLACES:
-        raise UsageError(f"{name} has {len(rows)} rows, expected at most {_MOST_PLACES}")
+    if len(rows) > _MAX_PLACES:
+        raise UsageError(f"{name} has {len(rows)} rows, expected at most {_MAX_PLACES}")
     header_rows = 1 if rows and [cell.strip().casefold() for cell in rows[0]] == ["x", "y", "label"] else 0
     places = tuple(
         _parse_place(row, f"{name}:{number}")
@@ -48,8 +48,8 @@ def read_table(name: str, files: Mapping[str, bytes]) -> tuple[tuple[str, ...], 
     """
     headings, *rows = _read_csv_rows(name, files, "table", "an answer and arguments") or [[]]
     numbered_rows = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
-    if not numbered_rows or len(numbered_rows) > _MOST_CALLS:
-        raise UsageError(f"{name} has {len(numbered_rows)} rows, expected headings and 1 to {_MOST_CALLS} rows")
+    if not numbered_rows or len(numbered_rows) > _MAX_CALLS:
+        raise UsageError(f"{name} has {len(numbered_rows)} rows, expected headings and 1 to {_MAX_CALLS} rows")
     for number, row in numbered_rows:
         if len(row) != len(headings):
             raise UsageError(f"{name}:{number} has {len(row)} cells, expected {len(headings)} as in the first row")

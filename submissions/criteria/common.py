@@ -131,7 +131,7 @@ class Criterion(StrictTable):
         """Return the criterion completed with data from the rest of the assignment.
 
         Raises:
-            Misfit: The data cannot be read.
+            UnmetRequirement: The data cannot be read.
         """
         return self
 

@@ -22,7 +22,7 @@ from submissions.criteria.places import Zone
 from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
-_MOST_FOR_LABELS = 0.49  # less than half of the distance between the numbers of two labels
+_MAX_LABEL_TOLERANCE = 0.49  # less than half of the distance between the numbers of two labels
 
 
 class Reports(CriterionWithStrays):
@@ -62,7 +62,7 @@ class Reports(CriterionWithStrays):
     @property
     def leeway(self) -> float:
         """The maximum difference of numbers. For labels, it is small enough that no number matches two labels."""
-        return self.tolerance if self.expected != "label" else min(self.tolerance, _MOST_FOR_LABELS)
+        return self.tolerance if self.expected != "label" else min(self.tolerance, _MAX_LABEL_TOLERANCE)
 
     @field_validator("expected", mode="plain")
     @classmethod

@@ -285,7 +285,7 @@ def test_a_flood_between_agents_ends_at_the_budget(
 
 
 def test_the_questions_of_a_trial_are_counted(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("responders.agents._MOST_QUESTIONS", 50)
+    monkeypatch.setattr("responders.agents._MAX_QUESTIONS", 50)
     recording = run(runner, agent="def agent(text):\n    while True: logger(1, 2)\n")
     assert recording.verdict is Verdict.OUTPUT_LIMIT
     assert recording.faults[0].agent == "agent"

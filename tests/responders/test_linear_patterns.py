@@ -98,7 +98,7 @@ def test_the_patterns_include_those_for_randomness() -> None:
 
 @pytest.mark.parametrize("fragment", ["type(", "from a import ", "a\u0300\u0323", "\u0300\u0323", "ﷺ"])
 def test_searching_a_text_for_randomness_takes_bounded_time(fragment: str) -> None:
-    for length in (repeated_faults._MOST_CHARACTERS - 1, 20 * repeated_faults._MOST_CHARACTERS):
+    for length in (repeated_faults._MAX_CHARACTERS - 1, 20 * repeated_faults._MAX_CHARACTERS):
         with _limit_cpu_seconds(2):
             repeated_faults._may_use_chance({"text": (fragment * length)[:length]}, None)
 

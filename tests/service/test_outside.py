@@ -33,7 +33,7 @@ def answering(answer: bytes) -> Iterator[str]:
 def get(
     url: str, others: outgoing_requests.Networks = ALL_NETWORKS, most_bytes: int = 0
 ) -> outgoing_requests.HttpResponse:
-    return send_request(url, method="GET", body=None, headers={}, allowlist=others, most_bytes=most_bytes)
+    return send_request(url, method="GET", body=None, headers={}, allowlist=others, max_bytes=most_bytes)
 
 
 def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:

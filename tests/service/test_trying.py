@@ -19,7 +19,7 @@ from service.store.people.students import Students, ensure_course
 from service.store.queue import test_runs
 from service.store.queue.test_runs import StudentTestRun
 from service.store.states import RunState
-from service.test_runs import LONGEST_SECONDS, build_single_trial_assignment
+from service.test_runs import MAX_SECONDS, build_single_trial_assignment
 from sim.errors import HostError
 from submissions.assignment.definition import Assignment, Scenario, Visibility
 from submissions.assignment.limits import Limits
@@ -79,7 +79,7 @@ def test_it_is_one_short_trial_of_many() -> None:
     assert once is not None
     (trial,) = once.trials()
     assert trial.pose == asked.scenarios[0].poses[0]
-    assert trial.scenario.seconds <= LONGEST_SECONDS
+    assert trial.scenario.seconds <= MAX_SECONDS
     assert (once.limits.program_cpu, once.limits.all_cpu) < (5, 20)
     small = build_single_trial_assignment(replace(asked, limits=Limits(program_cpu=0.5)))
     assert small is not None

@@ -204,7 +204,7 @@ def test_what_is_no_batch_is_refused_in_one_sentence(tmp_path: Path, make: objec
 
 
 def test_a_zip_that_grows_too_large_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("submissions.batch_folder._MOST_BYTES", 1_000_000)
+    monkeypatch.setattr("submissions.batch_folder._MAX_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "all.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("ada/robot.py", b"\0" * 2_000_000)
     with pytest.raises(UsageError, match="unpacks to more than"):

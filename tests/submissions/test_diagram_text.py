@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from notebook_builder import MESSAGING
 from sim.errors import UsageError
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider
-from submissions.diagram_cells import MOST_DIAGRAMS, MOST_PARTS, read_diagrams
+from submissions.diagram_cells import MAX_DIAGRAMS, MAX_PARTS, read_diagrams
 from submissions.diagram_text import MAX_ACTORS, MAX_DEPTH, MAX_GROUPS, MAX_STEPS, read_diagram
 from submissions.diagram_tokens import MAX_CHARACTERS
 from submissions.notebook import read_notebook
@@ -263,14 +263,14 @@ def test_diagrams_are_left_out_that_would_take_too_long_together() -> None:
     sources = [f"%%seqdiag\n{steps}"] * 20
     sources.insert(5, "%%seqdiag\na -> b")
     found = read_diagrams(Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1))))
-    assert 80 <= sum(cell.diagram.parts for cell in found.cells) <= MOST_PARTS
+    assert 80 <= sum(cell.diagram.parts for cell in found.cells) <= MAX_PARTS
     assert [cell.cell for cell in found.cells] == [1, 6]
-    assert len(found.problems) == MOST_DIAGRAMS - 2 + 1
+    assert len(found.problems) == MAX_DIAGRAMS - 2 + 1
     assert all("not drawn" in problem or "are drawn" in problem for problem in found.problems)
 
 
 def test_of_very_many_diagrams_the_first_are_read() -> None:
     cells = tuple(Cell(number, "%%seqdiag\na -> b") for number in range(1, 200))
     found = read_diagrams(Notebook("n.ipynb", cells))
-    assert len(found.cells) == MOST_DIAGRAMS
-    assert found.problems == (f"cell {MOST_DIAGRAMS + 1}: of all diagrams only the first {MOST_DIAGRAMS} are drawn",)
+    assert len(found.cells) == MAX_DIAGRAMS
+    assert found.problems == (f"cell {MAX_DIAGRAMS + 1}: of all diagrams only the first {MAX_DIAGRAMS} are drawn",)

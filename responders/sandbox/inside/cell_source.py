@@ -94,7 +94,7 @@ def expand_line(line: str, names: Mapping[str, Any]) -> str:
 
 
 def list_expressions(line: str) -> Iterator[str]:
-    """Yield the expressions that ``expanded`` evaluates, as far as the line can be parsed."""
+    """Yield the expressions that ``expand_line`` evaluates, as far as the line can be parsed."""
     try:
         for literal, expression, _, _ in string.Formatter().parse(line):
             yield from (match["name"] for match in _DOLLAR.finditer(literal) if match["name"])

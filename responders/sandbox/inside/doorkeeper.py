@@ -27,11 +27,11 @@ _RECEIVE, _SEND = 0xC0502100, 0xC0182101  # SECCOMP_IOCTL_NOTIF_RECV and _SEND
 _QUESTION = struct.Struct("=QIIiIQ6Q")  # id, pid, flags, number, architecture, instruction, arguments
 _ANSWER = struct.Struct("=QqiI")  # id, value, error, flags
 _CONTINUE = 1
-_LONGEST_PATH = 4096
+_MAX_PATH_LENGTH = 4096
 _CURRENT_FOLDER = -100  # AT_FDCWD
 _PR_SET_PDEATHSIG = 1
 #: Maximum number of files a child may create, including deleted ones, because inode numbers are visible to others.
-_MOST_FILES = 300
+_MAX_FILES = 300
 
 
 @dataclass
@@ -130,7 +130,7 @@ def _serve_requests(door: socket.socket, known_paths: _KnownPaths) -> None:
 
 
 def _accept_child(door: socket.socket) -> _RegisteredChild:
-    folder, ancillary, _, _ = door.recvmsg(_LONGEST_PATH, socket.CMSG_SPACE(2 * 4))
+    folder, ancillary, _, _ = door.recvmsg(_MAX_PATH_LENGTH, socket.CMSG_SPACE(2 * 4))
     if not folder:
         os.wait()
         os._exit(0)
@@ -157,7 +157,7 @@ def _answer_request(guest: _RegisteredChild, known_paths: _KnownPaths) -> None:
 def _check_request(guest: _RegisteredChild, known_paths: _KnownPaths, number: int, arguments: list[int]) -> int:
     """Return an error number, or 0. A forbidden path appears missing, or can't be opened."""
     for folder_argument, path_argument in PATH_ARGUMENTS[number]:
-        path, end, _ = os.pread(guest.memory, _LONGEST_PATH, arguments[path_argument]).partition(b"\0")
+        path, end, _ = os.pread(guest.memory, _MAX_PATH_LENGTH, arguments[path_argument]).partition(b"\0")
         if not end:
             return errno.ENAMETOOLONG
         is_from_folder = folder_argument is None or ctypes.c_int(arguments[folder_argument]).value == _CURRENT_FOLDER
@@ -168,4 +168,4 @@ def _check_request(guest: _RegisteredChild, known_paths: _KnownPaths, number: in
     flags = arguments[FLAG_ARGUMENTS[number]] if number in FLAG_ARGUMENTS else 0
     if flags & os.O_CREAT and not os.path.lexists(os.path.join(guest.folder, path)):
         guest.created_files += 1
-    return errno.EDQUOT if guest.created_files > _MOST_FILES else 0
+    return errno.EDQUOT if guest.created_files > _MAX_FILES else 0

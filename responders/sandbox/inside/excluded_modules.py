@@ -74,7 +74,7 @@ def _list_module_paths(specification: ModuleSpec | None) -> list[str]:
     return [specification.origin, os.path.join(os.path.dirname(specification.origin), "__pycache__")]
 
 
-def hide_modules(names: tuple[str, ...], libraries: tuple[str, ...], tell: Callable[[str], None]) -> None:
+def hide_modules(names: tuple[str, ...], libraries: tuple[str, ...], report: Callable[[str], None]) -> None:
     """Hide these modules from student code. ``tell(sentence)`` is called for each refusal.
 
     ``libraries`` are the folders of code that may still import them by an ``import`` statement.
@@ -92,7 +92,7 @@ def hide_modules(names: tuple[str, ...], libraries: tuple[str, ...], tell: Calla
     def refusal(module: str) -> ImportError | None:
         error = _build_error(module, names)
         if error is not None:
-            tell(str(error))
+            report(str(error))
         return error
 
     @contextlib.contextmanager

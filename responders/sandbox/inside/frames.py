@@ -16,7 +16,7 @@ Frame = dict[str, Any]
 
 #: Maximum line length that the worker accepts, bytes.
 MAX_FRAME_BYTES = 65536
-_LONGEST_NUMBER = 20
+_MAX_NUMBER_LENGTH = 20
 #: Maximum bytes per character: for the first 65,536 code points, and for all.
 _WIDE, _WIDEST = 6, 12
 #: Texts up to this length are never cut.
@@ -24,7 +24,7 @@ _NEVER_CUT_LENGTH = 100
 
 #: Header of a packet: zero, where a line begins with a brace, then the number of entries and the frame number.
 _HEADER = struct.Struct("<BxHxxxxQ")
-_MOST_ACTS = 2000
+_MAX_DELAYED_ACTIONS = 2000
 #: Maximum bytes per read. Longer frames arrive in parts.
 _READ_BYTES = 8192
 
@@ -44,7 +44,7 @@ class Wire:
     def act_later(self, packed: bytes) -> None:
         """Send an action of a robot program with the next frame that can't wait."""
         self._acts.append(packed)
-        if len(self._acts) == _MOST_ACTS:
+        if len(self._acts) == _MAX_DELAYED_ACTIONS:
             self._write(b"")
 
     def act(self, packed: bytes) -> None:
@@ -69,7 +69,7 @@ class Wire:
         number = self._sent
         self._sent += 1
         text = _encode(frame)
-        if len(text) > MAX_FRAME_BYTES - _LONGEST_NUMBER:
+        if len(text) > MAX_FRAME_BYTES - _MAX_NUMBER_LENGTH:
             text = _encode(shorten_frame(frame))
         return b'{"n":%d,%s\n' % (number, text.encode("ascii")[1:])
 

@@ -52,7 +52,7 @@ def explain_joblib_errors() -> None:
     load = joblib.load
 
     @functools.wraps(load)
-    def explained(filename: Any, *args: Any, **options: Any) -> Any:
+    def load_with_explanation(filename: Any, *args: Any, **options: Any) -> Any:
         file = os.path.basename(filename) if isinstance(filename, str) else "the model"
         try:
             return load(filename, *args, **options)
@@ -72,10 +72,10 @@ def explain_joblib_errors() -> None:
                 f"{file} cannot be loaded as a model, expected one that joblib.dump or pickle.dump wrote ({cause})"
             ) from None
 
-    joblib.load = numpy_pickle.load = explained
+    joblib.load = numpy_pickle.load = load_with_explanation
 
 
-def install_version_notes(tell: Callable[[str], None]) -> None:
+def install_version_notes(report: Callable[[str], None]) -> None:
     """Report once per version that a model was saved by another scikit-learn. Other warnings are shown as usual."""
     if "sklearn" not in sys.modules:
         return
@@ -84,7 +84,7 @@ def install_version_notes(tell: Callable[[str], None]) -> None:
     show = warnings.showwarning
     reported_versions: set[str] = set()
 
-    def show_or_tell(message: Any, category: Any, *more: Any, **others: Any) -> None:
+    def show_or_report(message: Any, category: Any, *more: Any, **others: Any) -> None:
         if not isinstance(message, InconsistentVersionWarning):
             show(message, category, *more, **others)
             return
@@ -92,6 +92,6 @@ def install_version_notes(tell: Callable[[str], None]) -> None:
         if saver not in reported_versions and len(reported_versions) < 3:
             reported_versions.add(saver)
             sentence = f"a model was saved by scikit-learn {saver} and is read by {reader}; it may answer differently"
-            tell(sentence)
+            report(sentence)
 
-    warnings.showwarning = show_or_tell
+    warnings.showwarning = show_or_report

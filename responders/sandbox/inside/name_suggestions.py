@@ -14,8 +14,8 @@ import sys
 from collections.abc import Iterable
 from types import ModuleType
 
-_LONGEST_NAME = 60
-_MOST_KNOWN = 5000
+_MAX_NAME_LENGTH = 60
+_MAX_KNOWN_NAMES = 5000
 _CANNOT_IMPORT = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
 #: Import statements for names that are often used without one.
 _IMPORTS = {
@@ -85,8 +85,8 @@ def _suggest_module_function(error: AttributeError) -> str:
 
 def _suggest_near_name(name: str, known_names: Iterable[object], cutoff: float) -> str:
     """Return ``Did you mean print?`` for the best match of ``name`` among ``known_names``, or ""."""
-    names = [each for each in known_names if type(each) is str and len(each) <= _LONGEST_NAME][:_MOST_KNOWN]
-    if name in names or len(name) > _LONGEST_NAME:
+    names = [each for each in known_names if type(each) is str and len(each) <= _MAX_NAME_LENGTH][:_MAX_KNOWN_NAMES]
+    if name in names or len(name) > _MAX_NAME_LENGTH:
         return ""
     candidates = {_normalise_name(each): each for each in reversed(names) if not each.startswith("_")}
     matches = difflib.get_close_matches(_normalise_name(name), candidates, 1, cutoff)

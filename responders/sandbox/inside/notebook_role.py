@@ -19,8 +19,8 @@ from .lockdown import Grants
 from .responder_role import ResponderRole
 from .shell import Shell
 
-_MOST_NOTES = 60
-_LONGEST_OUTPUT = 2000
+_MAX_NOTES = 60
+_MAX_OUTPUT_LENGTH = 2000
 _ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")
 
 
@@ -70,7 +70,7 @@ class NotebookRole(ResponderRole):
     def note(self, text: str) -> None:
         """Send a note to the worker, with the current line."""
         self._notes += 1
-        if self._notes <= _MOST_NOTES:
+        if self._notes <= _MAX_NOTES:
             self._wire.send({"do": "note", "text": clip(text, 300), **self._files.locate_frame(sys._getframe())})
 
     def expand(self, line: str) -> str:
@@ -125,7 +125,7 @@ class NotebookRole(ResponderRole):
             {
                 "do": "magic",
                 "name": name,
-                "arguments": clip(arguments, _LONGEST_OUTPUT),
+                "arguments": clip(arguments, _MAX_OUTPUT_LENGTH),
                 "body": body,
                 "line": line,
                 "missing": self._explain_missing_responder(),
@@ -182,7 +182,7 @@ class NotebookRole(ResponderRole):
         if value is not None and not text.rstrip().endswith(";"):
             self._namespace["_"] = value
             # Memory addresses are removed, because they differ between runs.
-            print(_ADDRESS.sub("", clip(repr(value), _LONGEST_OUTPUT)))
+            print(_ADDRESS.sub("", clip(repr(value), _MAX_OUTPUT_LENGTH)))
 
     def _evaluate(self, text: str, line_offset: int) -> Any:
         """Run the text and return the value of its last line, if it is an expression.

@@ -35,7 +35,7 @@ _MESSAGES = {
 }
 
 
-def install_refusals(grants: Grants, student: StudentFiles, tell: Callable[[str], None]) -> None:
+def install_refusals(grants: Grants, student: StudentFiles, report: Callable[[str], None]) -> None:
     """Install the errors. ``tell(sentence)`` is called for the first few, inside the refused call."""
     folder = os.getcwd()
     own_folders = (folder,) if folder != "/" else ()
@@ -49,7 +49,7 @@ def install_refusals(grants: Grants, student: StudentFiles, tell: Callable[[str]
         refusal = (sentence, location["file"], location["line"])
         if refusal not in reported_refusals and len(reported_refusals) < _MAX_REPORTS:
             reported_refusals.add(refusal)
-            tell(sentence)
+            report(sentence)
 
     def refuse(sentence: str) -> PermissionError:
         note(sentence)

@@ -15,7 +15,7 @@ from typing import Any
 from .frames import Frame
 
 _TABLE = "__ran__"
-_LONGEST_LINE = 1_000_000
+_MAX_LINE_LENGTH = 1_000_000
 _RECURSION_LIMIT = 30_000
 _BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
@@ -50,7 +50,7 @@ class _StatementTable(dict[int, None]):
 
     def __missing__(self, position: int) -> None:
         self[position] = None
-        line, column = divmod(position, _LONGEST_LINE)
+        line, column = divmod(position, _MAX_LINE_LENGTH)
         self._send({"do": "ran", "file": self._file, "line": line, "column": column})
 
 
@@ -67,7 +67,7 @@ def _build_lookup(statement: ast.stmt) -> Iterator[ast.stmt]:
     match statement:
         case ast.ImportFrom(module="__future__") | ast.Expr(value=ast.Constant(value=str())):
             return
-    position = ast.Constant(statement.lineno * _LONGEST_LINE + statement.col_offset)
+    position = ast.Constant(statement.lineno * _MAX_LINE_LENGTH + statement.col_offset)
     lookup = ast.Expr(ast.Subscript(ast.Name(_TABLE, ast.Load()), position, ast.Load()))
     for node in ast.walk(lookup):
         ast.copy_location(node, statement)

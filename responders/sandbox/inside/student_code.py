@@ -19,9 +19,9 @@ from .frames import Frame, clip
 from .name_suggestions import suggest_fix
 from .statement_watch import StatementWatch
 
-_MOST_WARNINGS, _LONGEST_WARNING = 20, 180
-#: The factor of the outermost line in a packed place, and how many frames are searched for it.
-MOST_LINES, _MOST_FRAMES = 1 << 20, 40
+_MAX_WARNINGS, _MAX_WARNING_LENGTH = 20, 180
+#: Factor of the outermost line in a packed pair of lines, and number of frames searched for that line.
+OUTER_LINE_FACTOR, _MAX_FRAMES = 1 << 20, 40
 Namespace = dict[str, Any]
 
 
@@ -73,14 +73,14 @@ class StudentFiles:
         """Return the innermost and the outermost running line of the main file, packed into one positive number."""
         inner = outer = 0
         frame: FrameType | None = sys._getframe(1)
-        for _ in range(_MOST_FRAMES):
+        for _ in range(_MAX_FRAMES):
             if frame is None:
                 break
             if frame.f_code.co_filename == self.main:
                 outer = frame.f_lineno
                 inner = inner or outer
             frame = frame.f_back
-        return max(inner, 1) + outer * MOST_LINES
+        return max(inner, 1) + outer * OUTER_LINE_FACTOR
 
     def describe_error(self, error: BaseException) -> Frame:
         """Return the error as a frame: type, text, last student line on its way, and a hint."""
@@ -199,10 +199,10 @@ def install_output(emit: Callable[[str], None]) -> None:
     builtins.input = no_input
 
 
-def install_warnings(tell: Callable[[str], None]) -> None:
+def install_warnings(report: Callable[[str], None]) -> None:
     """Report warnings with ``tell(sentence)`` instead of printing them, once for each of the first few.
 
-    ``tell`` is called inside the code that warns.
+    ``report`` is called inside the code that warns.
     """
     reported_warnings: set[str] = set()
 
@@ -210,8 +210,8 @@ def install_warnings(tell: Callable[[str], None]) -> None:
         message: Warning | str, category: type[Warning], filename: str, lineno: int, file: Any = None, line: Any = None
     ) -> None:
         sentence = f"{category.__name__}: {message}"
-        if sentence not in reported_warnings and len(reported_warnings) < _MOST_WARNINGS:
+        if sentence not in reported_warnings and len(reported_warnings) < _MAX_WARNINGS:
             reported_warnings.add(sentence)
-            tell(clip(sentence, _LONGEST_WARNING))
+            report(clip(sentence, _MAX_WARNING_LENGTH))
 
     warnings.showwarning = show

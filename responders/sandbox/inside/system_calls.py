@@ -256,5 +256,5 @@ _FILTER_TEMPLATE = pack_instructions(build_filter(_PLACEHOLDER_PID))
 
 
 def pack_filter(pid: int) -> bytes:
-    """Return ``instructions`` in binary form. All but the process id is computed before any fork."""
+    """Return the packed filter for this process id. Everything else is computed before any fork."""
     return _FILTER_TEMPLATE.replace(_PLACEHOLDER_PID.to_bytes(4, "little"), pid.to_bytes(4, "little"))

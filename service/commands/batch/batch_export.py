@@ -20,7 +20,7 @@ from service.reports.formats import FORMATS, Format
 from sim.errors import UsageError
 
 #: Maximum number of rows that a sentence names.
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 def export_batch(batch: str, form: str, output: Path | None, worksheet: Path | None, *, published: bool) -> None:
@@ -128,7 +128,7 @@ def _write_file(path: Path, text: str) -> None:
 
 def _warn_about_omitted(left_over: Sequence[str], reason: str) -> None:
     if left_over:
-        names = ", ".join(left_over[:_MOST_NAMED]) + (" ..." if len(left_over) > _MOST_NAMED else "")
+        names = ", ".join(left_over[:_MAX_NAMED]) + (" ..." if len(left_over) > _MAX_NAMED else "")
         _warn(f"{reason}: {names}")
 
 

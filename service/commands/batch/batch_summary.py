@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from service.operations.batch_views import BatchLine, JobLine
 
 #: Maximum number of students that a sentence names.
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 def summarize_jobs(line: BatchLine) -> str:
@@ -49,7 +49,7 @@ def describe_unjudged(lines: Sequence[JobLine]) -> str:
     students = [line.student for line in lines if line.unjudged]
     if not students:
         return ""
-    names = ", ".join(students[:_MOST_NAMED]) + (" ..." if len(students) > _MOST_NAMED else "")
+    names = ", ".join(students[:_MAX_NAMED]) + (" ..." if len(students) > _MAX_NAMED else "")
     subject = f"{len(students)} submissions have" if len(students) > 1 else "1 submission has"
     return (
         f"{subject} criteria that could not be judged and give no marks: {names}; robomark show GRADE shows the reasons"

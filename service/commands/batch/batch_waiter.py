@@ -29,8 +29,8 @@ from service.operations.types import BatchState
 from service.queue.notifier import Notifier
 
 #: The interval between queries grows with the waiting time, so that long waits cost the workers little.
-_SHORTEST_QUERY_SECONDS = 0.05
-_LONGEST_QUERY_SECONDS = 0.25
+_MIN_QUERY_SECONDS = 0.05
+_MAX_QUERY_SECONDS = 0.25
 _QUERIES_PER_WAIT = 20  # queries during the time waited so far
 _REAP_SECONDS = 2.0
 
@@ -110,4 +110,4 @@ class BatchWaiter:
                 if completed_count >= total_count:
                     return
                 waiting_time = time.monotonic() - start_time
-                time.sleep(min(max(_SHORTEST_QUERY_SECONDS, waiting_time / _QUERIES_PER_WAIT), _LONGEST_QUERY_SECONDS))
+                time.sleep(min(max(_MIN_QUERY_SECONDS, waiting_time / _QUERIES_PER_WAIT), _MAX_QUERY_SECONDS))

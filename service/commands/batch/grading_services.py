@@ -48,7 +48,7 @@ class PendingBatches:
 class NullNotifier:
     """A notifier that does nothing, for commands that wait.
 
-    These commands use ``Services.awaited``, which notifies the workers itself.
+    These commands use ``GradingServices``, which notifies the workers itself.
     """
 
     def grade(self, lane: JobQueue, count: int = 1) -> None:
@@ -67,9 +67,9 @@ class GradingServices:
 
     Attributes:
         settings: Settings that include the broker's address.
-        ours: True if this command started the services.
-        keep_up: Restarts services that stopped.
-        end: Stops the services.
+        is_own: Whether this command started the services.
+        restart_stopped: Restarts services that stopped.
+        stop: Stops the services.
     """
 
     settings: Settings

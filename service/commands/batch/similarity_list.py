@@ -21,7 +21,7 @@ from service.reports.similarity import (
 from service.reports.view import SimilarityView, build_similarity_view
 
 #: Maximum number of pairs on the screen and on the page. The JSON output contains all pairs.
-_MOST_SHOWN = 100
+_MAX_LISTED_PAIRS = 100
 
 
 def find_similar(batch: str, given_path: Path | None, output: Path | None) -> None:
@@ -43,7 +43,7 @@ def find_similar(batch: str, given_path: Path | None, output: Path | None) -> No
         view = build_similarity_view(findings.found or ())
         if output is not None:
             page = render_similarity_page(
-                view, findings.source, f"Similar submissions in {findings.batch.name}", _MOST_SHOWN
+                view, findings.source, f"Similar submissions in {findings.batch.name}", _MAX_LISTED_PAIRS
             )
             path = write_page(output, "similar.html", page)
             print_note(f"evidence: {path}")
@@ -55,12 +55,12 @@ def _show_similarity(view: SimilarityView) -> None:
     for similarity in view.found:
         print_line(describe_similarity(similarity))
         for kind, groups in (("the same file", similarity.same), ("the same recordings", similarity.same_recordings)):
-            for group in groups[:_MOST_SHOWN]:
+            for group in groups[:_MAX_LISTED_PAIRS]:
                 print_line(f"{kind}: {', '.join(group)}")
         table = create_table("student", "student", "alike", "where", "same behaviour")
-        for row in build_similarity_rows(similarity)[:_MOST_SHOWN]:
+        for row in build_similarity_rows(similarity)[:_MAX_LISTED_PAIRS]:
             table.add_row(*row)
         if similarity.pairs:
             print_renderables(table)
-        if len(similarity.pairs) > _MOST_SHOWN:
-            print_line(f"{len(similarity.pairs) - _MOST_SHOWN} more pairs are not shown; --json shows all")
+        if len(similarity.pairs) > _MAX_LISTED_PAIRS:
+            print_line(f"{len(similarity.pairs) - _MAX_LISTED_PAIRS} more pairs are not shown; --json shows all")

@@ -129,8 +129,8 @@ def _describe_rule(rule: str) -> str:
     return f"a {rule} loop" if rule in ("for", "while") else rule
 
 
-_LONGEST_MESSAGE = 500
-_MOST_MEASURES = 20
+_MAX_MESSAGE_LENGTH = 500
+_MAX_MEASURES = 20
 
 
 def list_calls(criterion: Functions) -> tuple[FunctionCall, ...]:
@@ -224,9 +224,9 @@ def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outc
     numbers = [score, *measures.values()] if isinstance(measures, dict) else [None]
     if not isinstance(message, str) or not all(map(_is_number, numbers)):
         raise AssignmentError(f"{problem}: message is a text, score a number, measures maps names to numbers.")
-    message = " ".join(message.split())[:_LONGEST_MESSAGE]
+    message = " ".join(message.split())[:_MAX_MESSAGE_LENGTH]
     kept_measures = tuple(
-        Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MOST_MEASURES]
+        Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MAX_MEASURES]
     )
     if result["passed"]:
         return pass_with(message, measures=kept_measures)

@@ -1,6 +1,6 @@
 """Judging: one result per criterion, from the assignment and its trials.
 
-The module named like a criterion's schema judges it. This module names none of them.
+The judge of a criterion is in the module with the same name as the module of its schema.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from submissions.criteria import Criterion
 _SMALL_INPUT = 100_000
 _CHARACTERS_PER_TEXT = 20  # characters added per text
 _HEARTBEAT_MILLISECONDS = 200
-_LONGEST_CAUSE = 300
+_MAX_CAUSE_LENGTH = 300
 _FRAME = struct.Struct("<Q")
 _IMAGE = "IMG_DATA::"
 #: Only its limits or its parent end the child. A signal that stops the service must not count as a judging failure.
@@ -197,9 +197,9 @@ class _JudgingProcess:
         except MemoryError:
             return _build_unjudged_result(criterion, f"it used more than {self.bounds.memory_bytes >> 20} MB of memory")
         except RobomarkError as error:
-            return _build_unjudged_result(criterion, str(error).rstrip(".")[:_LONGEST_CAUSE])
+            return _build_unjudged_result(criterion, str(error).rstrip(".")[:_MAX_CAUSE_LENGTH])
         except Exception as error:
-            return _build_unjudged_result(criterion, f"{type(error).__name__}: {error}"[:_LONGEST_CAUSE])
+            return _build_unjudged_result(criterion, f"{type(error).__name__}: {error}"[:_MAX_CAUSE_LENGTH])
 
 
 def _confine_process(bounds: JudgingLimits) -> None:

@@ -92,7 +92,7 @@ def _format_image_count(count: int) -> str:
     return f"{count or 'no'} image{'' if count == 1 else 's'}"
 
 
-def _format_there_are(count: int) -> str:
+def _format_existing_count(count: int) -> str:
     return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
 
 
@@ -108,7 +108,9 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
     ):
         actual_count = sum(entry[0] == side for entry in log)
         expectation = f"at least {_format_image_count(minimum)}" if count is None else _format_image_count(count)
-        message = f"Expected {expectation} of the {side} sensor to be logged, but {_format_there_are(actual_count)}"
+        message = (
+            f"Expected {expectation} of the {side} sensor to be logged, but {_format_existing_count(actual_count)}"
+        )
         if count is not None or minimum:
             share = (
                 min(Fraction(actual_count, minimum), Fraction(1)) if count is None else Fraction(actual_count == count)

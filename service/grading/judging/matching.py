@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 MatchMatrix = Sequence[Sequence[bool]]
 
 
-def match_most_pairs(matches: MatchMatrix) -> list[int | None]:
+def match_maximum_pairs(matches: MatchMatrix) -> list[int | None]:
     """Return the candidate of each requirement, None without one, with as many pairs as possible.
 
     Uses maximum bipartite matching by augmenting paths. Among equal solutions, earlier requirements get candidates.
@@ -44,7 +44,9 @@ def _find_free_candidate(
     return None
 
 
-def match_most_in_order(wishes: int, first_from: Callable[[int, int], int | None], step: int = 1) -> list[int | None]:
+def match_maximum_in_order(
+    wishes: int, first_from: Callable[[int, int], int | None], step: int = 1
+) -> list[int | None]:
     """Return the place of each requirement, None if it is left out, with as many in order as possible.
 
     ``first_from(wish, start)`` returns the first place from ``start`` on that matches. The search for the next

@@ -10,13 +10,13 @@ from service.grading.judging.outcome import Outcome, find_ending_fault
 from sim.recording import Fault, Verdict
 from submissions.sweep import CONDITIONS
 
-_LONGEST_QUOTE = 80
+_MAX_QUOTE_LENGTH = 80
 
 
 def quote_text(text: str) -> str:
     """Return a student's text for use in a sentence: in quotes, on one line, shortened."""
     line = " ".join(text.split())
-    return f'"{line}"' if len(line) <= _LONGEST_QUOTE else f'"{line[: _LONGEST_QUOTE - 3]}..."'
+    return f'"{line}"' if len(line) <= _MAX_QUOTE_LENGTH else f'"{line[: _MAX_QUOTE_LENGTH - 3]}..."'
 
 
 def quote_list(texts: tuple[str, ...], conjunction: str = "and") -> str:

@@ -22,7 +22,7 @@ from service.grading.judging.geometry import (
     find_true_runs,
 )
 from service.grading.judging.judge_declaration import declare_judge
-from service.grading.judging.matching import match_most_in_order, match_most_pairs
+from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
 from service.grading.judging.moves import (
     Move,
     build_move,
@@ -276,7 +276,9 @@ def _match_moves(criterion: Moves, moves: tuple[Move, ...]) -> list[Move | None]
     def find_next_match(wish: int, start: int) -> int | None:
         return next((place for place in range(start, len(moves)) if matches[wish][place]), None)
 
-    places = match_most_in_order(len(matches), find_next_match) if criterion.in_order else match_most_pairs(matches)
+    places = (
+        match_maximum_in_order(len(matches), find_next_match) if criterion.in_order else match_maximum_pairs(matches)
+    )
     return [None if place is None else moves[place] for place in places]
 
 

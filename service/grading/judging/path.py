@@ -18,7 +18,7 @@ from service.grading.judging.geometry import (
     measure_area_distance,
 )
 from service.grading.judging.judge_declaration import declare_judge
-from service.grading.judging.matching import match_most_in_order
+from service.grading.judging.matching import match_maximum_in_order
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Floats, Recording
 from submissions.criteria.path import KeepsOut, StaysInside, TouchesNothing, Visits
@@ -29,7 +29,7 @@ _STOP = 15
 #: The smallest change of heading that counts as a turn, degrees.
 _TURN = 2.0
 #: Longer than any straight path on the floor, mm.
-_FAR = 10_000.0
+_RAY_LENGTH = 10_000.0
 
 PART_NAMES = {
     "robot": "the robot",
@@ -92,7 +92,7 @@ def _find_visited_rows(criterion: Visits, points: Floats) -> list[int | None]:
 
     if criterion.in_order:
         # Places may overlap, so one row may be in several.
-        return match_most_in_order(len(inside_rows), find_next_row, step=0)
+        return match_maximum_in_order(len(inside_rows), find_next_row, step=0)
     return [find_next_row(place, 0) for place in range(len(inside_rows))]
 
 

@@ -31,7 +31,7 @@ from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Floats, Recording
 from submissions.criteria.point import Circuits, Closest, Spread
 
-_FAR = 10_000.0
+_RAY_LENGTH = 10_000.0
 _TURN = 2.0
 
 
@@ -100,7 +100,7 @@ def _measure_straight_distance(recording: Recording, x: float, y: float) -> floa
     """Return the least distance from a point to the ray ahead of the start, mm."""
     start = recording.start
     heading = math.radians(start.heading)
-    end = (start.x + _FAR * math.cos(heading), start.y + _FAR * math.sin(heading))
+    end = (start.x + _RAY_LENGTH * math.cos(heading), start.y + _RAY_LENGTH * math.sin(heading))
     return float(measure_segment_distance(np.array([[x, y]]), (start.x, start.y), end)[0])
 
 

@@ -45,7 +45,7 @@ _STATUS_ORDER: tuple[ReplyStatus, ...] = ("answered", "late", "malformed", "unan
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """The reply to one image. ``text`` is the answer that counts; ``words`` says why there is none."""
+    """The reply to one image. ``text`` is the answer that counts; ``words`` is the reason if there is none."""
 
     status: ReplyStatus
     text: str | None
@@ -103,7 +103,7 @@ def _build_missing_reply(
     return Reply("unanswered", None, answers.describe_silence(question))
 
 
-#: An image taken this close to an earlier one shows the same again, mm.
+#: Images taken within this distance show the same pattern, mm.
 _SAME_PLACE_MM = 1.0
 
 
@@ -144,12 +144,12 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
             trial_images.append(Sample(index, image, finder.to_canonical(truth), answer, description, confidence))
         images += trial_images
         samples += _collect_counted_samples(criterion, index, trial, trial_images, finder)
-    by_index = dict(trials)
-    of_trial: dict[int, list[Sample]] = {index: [] for index in by_index}
+    trials_by_index = dict(trials)
+    samples_by_trial: dict[int, list[Sample]] = {index: [] for index in trials_by_index}
     for sample in samples:
-        of_trial[sample.trial].append(sample)
+        samples_by_trial[sample.trial].append(sample)
     predictions = tuple(
-        Prediction(sample.image, sample.truth, sample.answer, by_index[sample.trial].scenario, sample.trial)
+        Prediction(sample.image, sample.truth, sample.answer, trials_by_index[sample.trial].scenario, sample.trial)
         for sample in images
         if sample.image is not None
     )
@@ -169,7 +169,7 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         tuple(samples),
         _compute_accuracy(samples, labels, counts),
         predictions,
-        tuple(_build_evidence(index, own) for index, own in of_trial.items()),
+        tuple(_build_evidence(index, own) for index, own in samples_by_trial.items()),
     )
 
 
@@ -233,7 +233,7 @@ def _collect_counted_samples(
 ) -> Sequence[Sample]:
     """Return a trial's images or patterns. Missing ones are replaced by wrong answers."""
     if criterion.each_pattern is None:
-        # Near the start there is one thing to see. Otherwise a robot could send more images of what it is sure of.
+        # Near the start there is only one pattern. Otherwise a robot could send more images of an easy pattern.
         radius = max(_SAME_PLACE_MM, 2 * (criterion.near_start or 0.0))
         counted_samples = group_by_pattern(trial_images, trial.recording, "majority", radius)
     else:
@@ -351,11 +351,11 @@ def _parse_probability(value: object) -> float | None:
     return float(value)
 
 
-def _list_lines_between(recording: Recording, image: Image, speech: bool) -> Sequence[TimedText]:
+def _list_lines_between(recording: Recording, image: Image, is_speech: bool) -> Sequence[TimedText]:
     """Return what the robot said or printed after this image and before the next."""
     next_index = bisect_right(recording.images, image.message, key=lambda other: other.message)
     end = recording.images[next_index].t if next_index < len(recording.images) else math.inf
-    lines = recording.spoken if speech else recording.printed
+    lines = recording.spoken if is_speech else recording.printed
     return lines[bisect_left(lines, image.t, key=_get_time) : bisect_left(lines, end, key=_get_time)]
 
 

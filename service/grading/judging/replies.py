@@ -31,7 +31,7 @@ from sim.recording_values import get_pose_at
 from submissions.criteria.replies import Replies, list_allowed_answers
 
 #: Messages that were sent instead are quoted up to this number and length.
-_MOST_SENT, _LONGEST_SENT = 3, 60
+_MAX_QUOTED_MESSAGES, _MAX_QUOTED_LENGTH = 3, 60
 
 _NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so there was nothing to answer."
 
@@ -179,8 +179,8 @@ def _explain_unsent(tries: Sequence[Message], sent_messages: Sequence[Message]) 
     unreachable_message = next((message for message in tries if is_out_of_reach(message)), None)
     if unreachable_message:
         return f"the channel lost it ({describe_loss(unreachable_message)})"
-    texts = tuple(dict.fromkeys(message.text for message in sent_messages if len(message.text) <= _LONGEST_SENT))
-    return f"it was not; it was sent {quote_list(texts[:_MOST_SENT])}" if texts else "it was not"
+    texts = tuple(dict.fromkeys(message.text for message in sent_messages if len(message.text) <= _MAX_QUOTED_LENGTH))
+    return f"it was not; it was sent {quote_list(texts[:_MAX_QUOTED_MESSAGES])}" if texts else "it was not"
 
 
 def _describe_wrong_answer(criterion: Replies, answers: Answers, index: int, allowed_answers: Sequence[object]) -> str:

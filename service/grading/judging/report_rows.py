@@ -54,7 +54,7 @@ class ReportTokens:
         states: Mapping[int, Values] = {0: ()}
         for count, entry in enumerate(row):
             after_text = count > 0 and isinstance(row[count - 1], str)
-            states, previous_ends = self._next(entry, states, after_text), states
+            states, previous_ends = self._advance_states(entry, states, after_text), states
             if not states:
                 return RowMatch(count, previous_ends[min(previous_ends)])
         return RowMatch(len(row), states[min(states)])
@@ -63,9 +63,9 @@ class ReportTokens:
         """Return whether all entries of ``row`` are in the report."""
         return self.find(row).count == len(row)
 
-    def _next(self, entry: Entry, states: Mapping[int, Values], after_text: bool) -> Mapping[int, Values]:
+    def _advance_states(self, entry: Entry, states: Mapping[int, Values], after_text: bool) -> Mapping[int, Values]:
         """Return where ``entry`` can end after one of the places ``states``, each with the numbers up to there."""
-        places = self._places(entry)
+        places = self._find_places(entry)
         length = len(split_words(entry)) if isinstance(entry, str) else 1
         starts = sorted(states)
         before_run = self._before_text if isinstance(entry, str) else self._before_number
@@ -82,7 +82,7 @@ class ReportTokens:
                 break  # After a number, any later place is allowed, so the first is enough.
         return ends
 
-    def _places(self, entry: Entry) -> list[int]:
+    def _find_places(self, entry: Entry) -> list[int]:
         """Return the places where ``entry`` begins, in order."""
         if isinstance(entry, str):
             parts = split_words(entry)
@@ -100,7 +100,7 @@ class ReportTokens:
         is_covered = [False] * len(self._words)
         for text in texts:
             length = len(split_words(text))
-            for index in self._places(text):
+            for index in self._find_places(text):
                 is_covered[index : index + length] = [True] * length
         return is_covered
 

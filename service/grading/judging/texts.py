@@ -45,7 +45,7 @@ _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 _EXCUSED = "Messages lost by chance count as received."
 _PRINT = TextWording("the program", "print", "printed")
 _RESPONDER_PRINT = TextWording("the responder", "print", "printed")
-_SAY = TextWording("the robot", "say", "said")
+_SPEECH_WORDING = TextWording("the robot", "say", "said")
 _SEND = TextWording("the robot", "send", "sent", addressed=True)
 _RECEIVE = TextWording("the robot", "receive", "received")
 
@@ -72,7 +72,7 @@ def _collect_responder_lines(recording: Recording) -> tuple[TimedText, ...]:
 @declare_judge(Says)
 def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
     """Judge what the robot said, in order."""
-    return judge_sequence(criterion, trial.recording.spoken, _SAY, trial.recording)
+    return judge_sequence(criterion, trial.recording.spoken, _SPEECH_WORDING, trial.recording)
 
 
 @declare_judge(Messages)

@@ -17,7 +17,7 @@ from sim.recording import Recording
 from sim.recording_values import tick_to_seconds
 from submissions.criteria.timing import Ranking, Timing
 
-_STILL = 1e-6  # mm or degrees per tick
+_MAX_STILL_CHANGE = 1e-6  # mm or degrees per tick
 
 
 @declare_judge(Timing)
@@ -103,5 +103,5 @@ def _measure_moving_seconds(recording: Recording) -> float:
         return 0.0
     start = recording.start
     columns = ((start.x, ticks.x), (start.y, ticks.y), (start.heading, ticks.heading))
-    changes = [np.abs(np.diff(column, prepend=first)) > _STILL for first, column in columns]
+    changes = [np.abs(np.diff(column, prepend=first)) > _MAX_STILL_CHANGE for first, column in columns]
     return tick_to_seconds(recording, int(np.logical_or.reduce(changes).sum()))

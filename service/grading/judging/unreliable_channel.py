@@ -26,7 +26,7 @@ from submissions.criteria.unreliable_channel import FreshAnswers, InReach, Resen
 
 #: Programs check, wait and print with a resolution of 10 ms.
 _ROUNDING = 0.011
-_MOST_WORDS = 50  # of an answer, for comparisons
+_MAX_WORDS = 50  # of an answer, for comparisons
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +197,7 @@ class _AnswerTimes:
         self._by_words: dict[tuple[str, ...], dict[str, float]] = {}
         arrivals = ((message.delivered or 0.0, each.text, message) for each in questions for message in each.answers)
         for t, text, message in sorted(arrivals, key=lambda each: each[0]):
-            words = tuple(split_words(_extract_value(criterion, message))[:_MOST_WORDS])
+            words = tuple(split_words(_extract_value(criterion, message))[:_MAX_WORDS])
             if words:
                 self._by_words.setdefault(words, {}).setdefault(text, t)
         self._lengths = sorted({len(words) for words in self._by_words})

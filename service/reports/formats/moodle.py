@@ -28,7 +28,7 @@ from submissions.downloads import parse_moodle_number
 _IDENTIFIER, _GRADE, _FEEDBACK, _MAXIMUM = "Identifier", "Grade", "Feedback comments", "Maximum Grade"
 #: Columns that identify a row if its submission did not come from Moodle, in order of priority.
 _NAMES = ("ID number", "Email address", "Full name")
-_LONGEST = 2000
+_MAX_COMMENT_LENGTH = 2000
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
 
 
@@ -125,7 +125,7 @@ def _format_feedback(row: TableRow[GradebookView]) -> str:
     if row.grade is not None:
         diagnosis = diagnose(row.grade.shown)
         summary = [*format_comments(row.grade.shown), diagnosis.cause, diagnosis.next_step, *diagnosis.further]
-    return to_one_line(" ".join([*summary, "; ".join(lines)]), _LONGEST)
+    return to_one_line(" ".join([*summary, "; ".join(lines)]), _MAX_COMMENT_LENGTH)
 
 
 def _format_criterion_marks(result: CriterionResult) -> str:

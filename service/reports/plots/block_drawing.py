@@ -25,7 +25,7 @@ from service.reports.plots.diagram_parts import (
 from service.reports.plots.style import HEAD, WIDTH, add_axes, create_figure
 from submissions.diagram import Diagram, DiagramArrow
 
-_MOST_ACROSS = 4  # levels side by side; more go down the page
+_MAX_HORIZONTAL_LEVELS = 4  # levels side by side; more go down the page
 _BOX = 1.02  # inches, the width of the widest label
 _GAP = 0.44  # between boxes, unless a label needs more
 _ROW = 0.42  # between boxes below each other
@@ -107,7 +107,7 @@ def _compute_page_layout(diagram: Diagram) -> _PageLayout:
     rows = 1 + int(2 * max(position.row for position in layout.values()))
     longest_label = max((len(line) for arrow in diagram.arrows for line in break_label(arrow.label, 2.0, 3)), default=0)
     gap = max(_GAP, longest_label / CHARACTERS + 0.26)
-    is_vertical = diagram.portrait or levels > _MOST_ACROSS or _compute_width(levels, gap) > WIDTH
+    is_vertical = diagram.portrait or levels > _MAX_HORIZONTAL_LEVELS or _compute_width(levels, gap) > WIDTH
     boxes_across, boxes_down = (rows, levels) if is_vertical else (levels, rows)
     width = max(WIDTH, _compute_width(boxes_across, gap))
     lines = max(len(break_label(actor.label, _BOX - 0.1, 4)) for actor in diagram.actors)

@@ -28,11 +28,15 @@ from service.reports.plots.style import (
 )
 
 NO_ANSWER = "no answer"
-_LABELS, _SHORT_LABELS = 1.22, 0.62  # inches for the true labels at the left
-_SHORT = 6  # largest number of characters in a short name
-_FOOT = 0.56  # inches
-_TOTALS, _ALL, _RECALL = 3.2, 0.85, 2.4  # widths in cells: the columns right of the counts, and positions in them
-_HEADS, _SHORT_HEADS = 1.06, 0.24  # for the answers at the top
+_LABEL_WIDTH, _SHORT_LABEL_WIDTH = 1.22, 0.62  # inches for the true labels at the left
+_MAX_SHORT_LENGTH = 6  # largest number of characters in a short name
+_FOOT_HEIGHT = 0.56  # inches
+_TOTALS_WIDTH, _TOTAL_OFFSET, _RECALL_OFFSET = (
+    3.2,
+    0.85,
+    2.4,
+)  # widths in cells: the columns right of the counts, and positions in them
+_HEADING_HEIGHT, _SHORT_HEADING_HEIGHT = 1.06, 0.24  # for the answers at the top
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +80,14 @@ def select_unit(accuracy: Accuracy) -> str:
 
 def draw_confusion_table(table: ConfusionTable, title: str, subtitle: str) -> Figure:
     """Draw the confusion matrix of ``table``."""
-    column_count = len(table.answers) + _TOTALS
-    labels = _LABELS if any(len(truth) > _SHORT for truth in table.truths) else _SHORT_LABELS
+    column_count = len(table.answers) + _TOTALS_WIDTH
+    labels = _LABEL_WIDTH if any(len(truth) > _MAX_SHORT_LENGTH for truth in table.truths) else _SHORT_LABEL_WIDTH
     cell = min(0.56, (WIDTH - labels - 0.14) / column_count)
     body_height = cell * (len(table.truths) + 0.85)
-    is_upright = any(len(answer) > _SHORT for answer in table.answers)
-    heading_height = _HEADS if is_upright else _SHORT_HEADS
-    figure = create_figure(HEAD + heading_height + body_height + _FOOT, title, subtitle)
-    axes = add_axes(figure, labels, _FOOT, cell * column_count, body_height + heading_height)
+    is_upright = any(len(answer) > _MAX_SHORT_LENGTH for answer in table.answers)
+    heading_height = _HEADING_HEIGHT if is_upright else _SHORT_HEADING_HEIGHT
+    figure = create_figure(HEAD + heading_height + body_height + _FOOT_HEIGHT, title, subtitle)
+    axes = add_axes(figure, labels, _FOOT_HEIGHT, cell * column_count, body_height + heading_height)
     axes.set_axis_off()
     axes.set_xlim(0, column_count)
     axes.set_ylim(body_height / cell, -heading_height / cell)
@@ -105,8 +109,11 @@ def _draw_names(axes: Axes, table: ConfusionTable, size: float, *, is_upright: b
     for row, truth in enumerate((*table.truths, "precision")):
         _draw_name(axes, -0.12, row + 0.5, truth, size, ha="right", va="center")
     count = len(table.answers)
-    headings = [*((column + 0.5, answer) for column, answer in enumerate(table.answers)), (count + _ALL, "total")]
-    for x, name in (*headings, (count + _RECALL, "recall")):
+    headings = [
+        *((column + 0.5, answer) for column, answer in enumerate(table.answers)),
+        (count + _TOTAL_OFFSET, "total"),
+    ]
+    for x, name in (*headings, (count + _RECALL_OFFSET, "recall")):
         if is_upright:
             _draw_name(axes, x, -0.18, name, size, ha="left", va="center", rotation=90)
         else:
@@ -141,10 +148,10 @@ def _draw_cells(axes: Axes, table: ConfusionTable, size: float) -> None:
                     font=load_font(_reduce_size(size), bold=True),
                     ha="right", va="top", color=colour,
                 )  # fmt: skip
-        _draw_number(axes, len(counts) + _ALL, row, str(table.totals[row]), size)
+        _draw_number(axes, len(counts) + _TOTAL_OFFSET, row, str(table.totals[row]), size)
         correct_count = counts[table.answers.index(table.truths[row])] if table.truths[row] in table.answers else 0
         _draw_number(
-            axes, len(counts) + _RECALL, row, _format_share(correct_count, table.totals[row]), _reduce_size(size)
+            axes, len(counts) + _RECALL_OFFSET, row, _format_share(correct_count, table.totals[row]), _reduce_size(size)
         )
     for column, answer in enumerate(table.answers):
         if answer in table.truths:

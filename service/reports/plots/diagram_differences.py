@@ -30,12 +30,12 @@ _PARTY_KEYWORDS: Mapping[str, frozenset[str]] = MappingProxyType(
     }
 )
 _WORD = re.compile(r"[a-z]+[0-9]*")
-_MOST_NAMED = 6
+_MAX_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Differences:
-    """The differences: names as in the diagram if only it has them, as in ``talks`` if only the recording has them.
+    """The differences: names as in the diagram, or as in ``MessageCount`` if only the recording has them.
 
     An arrow at an actor that is itself a difference is not listed. ``similarity`` is the fraction of all arrows, 0 to
     1, that both have.
@@ -157,9 +157,9 @@ def _format_arrow(pair: Pair) -> str:
 def _join_names(names: Iterable[str], language: Language) -> str:
     """Join names for a sentence, shortened if there are many."""
     short_names = [to_one_line(name, 70) for name in names]
-    if len(short_names) > _MOST_NAMED:
-        remainder = language.say("%(count)s more", count=len(short_names) - _MOST_NAMED + 1)
-        short_names = [*short_names[: _MOST_NAMED - 1], remainder]
+    if len(short_names) > _MAX_NAMED:
+        remainder = language.say("%(count)s more", count=len(short_names) - _MAX_NAMED + 1)
+        short_names = [*short_names[: _MAX_NAMED - 1], remainder]
     return language.say(" and ").join(
         [", ".join(short_names[:-1]), short_names[-1]] if len(short_names) > 1 else short_names
     )

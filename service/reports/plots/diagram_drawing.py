@@ -30,7 +30,7 @@ from submissions.diagram import Diagram, DiagramActor
 
 _HAPPENED = "#8a5a00"
 #: Limits of a conversation beside a diagram of it.
-_MOST_EXCHANGES, _MOST_STEPS = 2, 24
+_MAX_EXCHANGES, _MAX_STEPS = 2, 24
 
 
 def draw_own_diagram(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> Figure:
@@ -51,7 +51,7 @@ def draw_own_diagram(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> Figur
     if own_diagram.cell.diagram.kind == "blockdiag":
         recorded_diagram = build_block_diagram(count_messages(trial.recording))
     else:
-        recorded_diagram = build_sequence_diagram(build_conversation(trial.recording, _MOST_EXCHANGES, _MOST_STEPS))
+        recorded_diagram = build_sequence_diagram(build_conversation(trial.recording, _MAX_EXCHANGES, _MAX_STEPS))
         recorded_diagram = replace(
             recorded_diagram, actors=_sort_parties(recorded_diagram.actors, own_diagram.cell.diagram.actors)
         )

@@ -72,15 +72,15 @@ class Highlights:
             write_text(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
 
 
-def break_label(text: str, inches: float, most_lines: int) -> tuple[str, ...]:
+def break_label(text: str, inches: float, max_lines: int) -> tuple[str, ...]:
     """Break a label into lines of at most this width. Its own line breaks stay."""
     width = max(4, int(inches * CHARACTERS))
-    source_lines = [to_one_line(line, 200) for line in text.split("\n")[: most_lines + 1]]
+    source_lines = [to_one_line(line, 200) for line in text.split("\n")[: max_lines + 1]]
     lines = [piece for line in source_lines for piece in textwrap.wrap(line, width) or [""]]
     while lines and not lines[-1]:
         lines.pop()
-    if len(lines) > most_lines:
-        lines = [*lines[: most_lines - 1], lines[most_lines - 1][: width - 1] + "…"]
+    if len(lines) > max_lines:
+        lines = [*lines[: max_lines - 1], lines[max_lines - 1][: width - 1] + "…"]
     return tuple(lines)
 
 

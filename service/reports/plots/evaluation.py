@@ -34,7 +34,7 @@ from service.reports.plots.style import (
     write_text,
 )
 
-MOST_MISREAD = 10
+MAX_MISREAD = 10
 _SIDE, _GAP, _ROW = 0.74, 0.12, 0.92
 _TEXT = 3 * (_SIDE + _GAP) + 0.04
 _LINE = 16  # characters per line beside the images
@@ -110,13 +110,13 @@ def _build_curve(card_curve: CardCurve, label: str | None = None) -> Curve:
 
 
 def draw_evaluation_misread(evaluation: Evaluation) -> Figure:
-    """Draw at most ``MOST_MISREAD`` misread images, each beside its nearest correctly read neighbours.
+    """Draw at most ``MAX_MISREAD`` misread images, each beside its nearest correctly read neighbours.
 
     One neighbour is of the true class, one of the answered class. Distance is the mean square of the differences of
     greys.
     """
     misread = [each for each in evaluation.answered if not each.right]
-    shown_images = _rank_mistakes(misread)[:MOST_MISREAD]
+    shown_images = _rank_mistakes(misread)[:MAX_MISREAD]
     count, total_count = len(misread), len(evaluation.answered)
     count_text = f"{len(shown_images)} of {count}" if len(shown_images) < count else f"all {count}" if count else "none"
     title = f"{evaluation.card.name}: misread images"

@@ -19,10 +19,10 @@ from sim.recording import Call, Recording
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 
 #: Networks that are counted by name. Networks called later are counted together.
-_MOST_NETWORKS = 4
+_MAX_NETWORKS = 4
 _OTHER_NETWORKS = "other networks"
 #: The longest label of a message, beside a diagram with words as labels.
-_LONGEST_LABEL = 32
+_MAX_LABEL_LENGTH = 32
 _NAMED = frozenset(PARTIES) - {"network"}
 
 MessageKind = Literal["message", "call", "return"]
@@ -72,7 +72,7 @@ def _iterate_messages(recording: Recording) -> Iterator[tuple[tuple[str, str, Me
 
 
 def identify_party(name: str) -> str:
-    """Return the party of a name in ``talks``. Unknown names are networks."""
+    """Return the party of a sender or receiver in ``MessageCount``. Unknown names are networks."""
     return name if name in _NAMED else "network"
 
 
@@ -131,7 +131,7 @@ def _build_steps(conversation: SequenceDiagram) -> Iterator[DiagramArrow | Divid
             yield DiagramArrow(
                 step.source,
                 step.target,
-                to_one_line(step.label, _LONGEST_LABEL),
+                to_one_line(step.label, _MAX_LABEL_LENGTH),
                 "dashed" if step.kind == "return" else "solid",
                 failed=step.kind == "lost",
             )
@@ -141,8 +141,7 @@ def _name_callees(calls: Sequence[Call], agents: Iterable[str]) -> Mapping[str, 
     """Return the display name of each called name."""
     networks = dict.fromkeys(call.callee for call in calls if call.callee not in _NAMED)
     display_names = {
-        name: to_one_line(name, 20) if place < _MOST_NETWORKS else _OTHER_NETWORKS
-        for place, name in enumerate(networks)
+        name: to_one_line(name, 20) if place < _MAX_NETWORKS else _OTHER_NETWORKS for place, name in enumerate(networks)
     }
     return MappingProxyType(display_names | {name: name for name in (*_NAMED, *agents)})
 

@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 
 from service.grading.grade import Prediction
 from service.reports.display_text import to_one_line
-from service.reports.plots.sensor_images import MOST_MISREAD, MisreadImage, crop_focus
+from service.reports.plots.sensor_images import MAX_MISREAD, MisreadImage, crop_focus
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -36,8 +36,8 @@ _TEXT = 3 * (_SIDE + _GAP) + 0.08
 
 
 def draw_misread(misread_images: Sequence[MisreadImage], image_count: int, title: str) -> Figure:
-    """Draw at most ``MOST_MISREAD`` rows: the image, and the nearest correct ones of its truth and of its answer."""
-    shown_images = misread_images[:MOST_MISREAD]
+    """Draw at most ``MAX_MISREAD`` rows: the image, and the nearest correct ones of its truth and of its answer."""
+    shown_images = misread_images[:MAX_MISREAD]
     height = _ROW * len(shown_images)
     count = (
         f"{len(shown_images)} of {len(misread_images)}"

@@ -48,7 +48,7 @@ Pixels = NDArray[np.uint8]
 
 FLOOR_WIDTH, FLOOR_HEIGHT = 2362.0, 1143.0
 _MARGIN = 90.0  # mm around the path
-_SMALLEST_VIEW = 520.0  # mm, so that a robot that stands still is shown with its surroundings
+_MIN_VIEW_SIZE = 520.0  # mm, so that a robot that stands still is shown with its surroundings
 _BEYOND = 700.0  # mm outside the floor that are still shown
 _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is shown on all of it
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
@@ -158,7 +158,7 @@ def _choose_viewport(recording: Recording, points: NDArray[np.float64]) -> Viewp
 
 def _widen_viewport(view: Viewport) -> Viewport:
     """Return ``view`` widened to a shape between a square and the floor's."""
-    width, height = max(view.width, _SMALLEST_VIEW), max(view.height, _SMALLEST_VIEW / 1.6)
+    width, height = max(view.width, _MIN_VIEW_SIZE), max(view.height, _MIN_VIEW_SIZE / 1.6)
     width = max(width, height * 1.1)
     height = max(height, width * FLOOR_HEIGHT / FLOOR_WIDTH)
     x, y = (view.left + view.right) / 2, (view.bottom + view.top) / 2

@@ -17,7 +17,7 @@ from sim.recording import Pose, Recording
 from sim.recording_values import count_ticks_until, get_recorded_robot
 
 _TIME_SIZE, _NUMBER_SIZE = 7.6, 7.8  # points
-_FROM_PATH = 0.17, 0.15  # inches to the centre of a time
+_LABEL_OFFSETS = 0.17, 0.15  # inches to the centre of a time
 _LINE = 0.16  # inches between two words above each other
 
 
@@ -49,7 +49,10 @@ def draw_times(axes: Axes, recording: Recording, points: NDArray[np.float64], pe
         # On the robot's right, and for the second robot on its left, because both may drive the same way.
         angle = math.radians(float(points[row, 2]) + (90 if colour == SECOND_ROBOT else -90))
         candidates = [
-            (x + way * _FROM_PATH[0] * per_inch * math.cos(angle), y + way * _FROM_PATH[1] * per_inch * math.sin(angle))
+            (
+                x + way * _LABEL_OFFSETS[0] * per_inch * math.cos(angle),
+                y + way * _LABEL_OFFSETS[1] * per_inch * math.sin(angle),
+            )
             for way in (1, -1)
         ]
         free_positions = [

@@ -37,7 +37,7 @@ _COLUMNS = 2
 
 
 def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
-    """Draw cards of at most ``MOST_PREDICTIONS`` images, wrong answers first if not all fit."""
+    """Draw cards of at most ``MAX_PREDICTIONS`` images, wrong answers first if not all fit."""
     shown_indices = select_predictions(predictions)
     rows = -(-len(shown_indices) // _COLUMNS)
     height = rows * _CARD_HEIGHT

@@ -39,8 +39,8 @@ from sim.recording_values import tick_to_seconds
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's title
 _ROW = 0.15  # height of a strip of events
-_MOST_MARKS = 400  # of one kind; more would form a solid bar
-_LARGEST_READING = 1e100  # a program can set motor positions that are too large to draw
+_MAX_MARKS = 400  # of one kind; more would form a solid bar
+_MAX_READING = 1e100  # a program can set motor positions that are too large to draw
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
     axes.tick_params(axis="y", length=0)
     for row, strip in enumerate(reversed(strips)):
         axes.axhline(row, color=RULE, linewidth=0.6, zorder=0)
-        times = strip.times[:_MOST_MARKS]
+        times = strip.times[:_MAX_MARKS]
         axes.plot(times, [row] * len(times), strip.marker, color=strip.colour, markersize=4.5, markeredgewidth=0,
                   clip_on=False)  # fmt: skip
     for side in axes.spines.values():
@@ -182,7 +182,7 @@ def _compute_limits(panel: ReadingPanel) -> tuple[float, float]:
 
 
 def _clip_readings(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.clip(values, -_LARGEST_READING, _LARGEST_READING)
+    return np.clip(values, -_MAX_READING, _MAX_READING)
 
 
 def _label_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:

@@ -15,8 +15,8 @@ from PIL import Image as Pixels
 from service.grading.grade import Prediction
 from sim.recording import Image
 
-MOST_PREDICTIONS = 12
-MOST_MISREAD = 6
+MAX_PREDICTIONS = 12
+MAX_MISREAD = 6
 #: The part of the 20 x 20 image inside the round sensor: left, upper, right, lower.
 FOCUS = (3, 3, 17, 17)
 
@@ -34,7 +34,7 @@ class MisreadImage:
 def select_predictions(predictions: Sequence[Prediction]) -> tuple[int, ...]:
     """Return the indices of the images to show, ascending. If there are too many, wrong ones have priority."""
     order = sorted(range(len(predictions)), key=lambda index: (is_right(predictions[index]), index))
-    return tuple(sorted(order[:MOST_PREDICTIONS]))
+    return tuple(sorted(order[:MAX_PREDICTIONS]))
 
 
 def is_right(prediction: Prediction) -> bool:
@@ -75,11 +75,11 @@ def find_misread(predictions: Sequence[Prediction]) -> tuple[MisreadImage, ...]:
             _find_nearest(prediction, prediction.truth, greys),
             _find_nearest(prediction, prediction.answer, greys),
         )
-        for number, prediction in wrong_predictions[:MOST_MISREAD]
+        for number, prediction in wrong_predictions[:MAX_MISREAD]
     )
     return (
         *compared_images,
-        *(MisreadImage(number, prediction, None, None) for number, prediction in wrong_predictions[MOST_MISREAD:]),
+        *(MisreadImage(number, prediction, None, None) for number, prediction in wrong_predictions[MAX_MISREAD:]),
     )
 
 

@@ -18,10 +18,10 @@ from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, belongs to the party ``network``.
 PARTIES = ("robot", "responder", SECOND, "parser", "agent", "logger", "network")
-MOST_EXCHANGES = 6
-MOST_STEPS = 40
+MAX_EXCHANGES = 6
+MAX_STEPS = 40
 #: Per message, however many calls it causes in the responder.
-MOST_CALL_STEPS = 60
+MAX_CALL_STEPS = 60
 _KNOWN_PARTIES: Mapping[str, str] = MappingProxyType({party: party for party in PARTIES})
 
 StepKind = Literal["message", "call", "return", "lost", "silence"]
@@ -78,7 +78,7 @@ class _Exchange:
 
 
 def build_conversation(
-    recording: Recording, most_exchanges: int = MOST_EXCHANGES, most_steps: int = MOST_STEPS
+    recording: Recording, max_exchanges: int = MAX_EXCHANGES, max_steps: int = MAX_STEPS
 ) -> SequenceDiagram:
     """Return the messages across the bridge and the responder's calls, within the given limits.
 
@@ -88,7 +88,7 @@ def build_conversation(
     exchanges = [exchange for robot, own in iterate_robots(recording) for exchange in _iterate_exchanges(own, robot)]
     if recording.partner is not None:
         exchanges.sort(key=lambda exchange: exchange.begin)
-    kept_exchanges = _select_exchanges(exchanges, most_exchanges, most_steps)
+    kept_exchanges = _select_exchanges(exchanges, max_exchanges, max_steps)
     timed_steps: list[tuple[float, int, list[Step | Gap]]] = []
     skipped_count = 0
     for number, exchange in enumerate(exchanges):
@@ -115,7 +115,7 @@ def has_problem(message: Message) -> bool:
 
 
 def _iterate_exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
-    """Yield this robot's messages with their answers. Messages from the other robot belong to the other's list."""
+    """Yield this robot's messages with their answers. The other robot's list contains its messages."""
     messages = recording.messages
     answers: dict[int, list[int]] = {}
     for index, message in enumerate(messages):
@@ -131,24 +131,29 @@ def _iterate_exchanges(recording: Recording, robot: str) -> Iterator[_Exchange]:
         yield exchange if is_from_robot else _Exchange(None, (index,), recording, robot)
 
 
-def _select_exchanges(exchanges: Sequence[_Exchange], most_exchanges: int, most_steps: int) -> set[int]:
+def _select_exchanges(exchanges: Sequence[_Exchange], max_exchanges: int, max_steps: int) -> set[int]:
     failed_exchanges = [number for number, exchange in enumerate(exchanges) if _has_failed(exchange)]
-    half_count = most_exchanges - most_exchanges // 2
+    half_count = max_exchanges - max_exchanges // 2
     first_exchanges = range(min(half_count, len(exchanges)))
     order = dict.fromkeys(
-        [*first_exchanges, *_iterate_recovered(exchanges, failed_exchanges), *failed_exchanges, *range(len(exchanges))]
+        [
+            *first_exchanges,
+            *_iterate_recovered_exchanges(exchanges, failed_exchanges),
+            *failed_exchanges,
+            *range(len(exchanges)),
+        ]
     )
     kept_exchanges: set[int] = set()
     step_count = 0
-    for number in list(order)[:most_exchanges]:
+    for number in list(order)[:max_exchanges]:
         step_count += sum(len(told) for _, told in _build_steps(exchanges[number]))
-        if kept_exchanges and step_count > most_steps:
+        if kept_exchanges and step_count > max_steps:
             break
         kept_exchanges.add(number)
     return kept_exchanges
 
 
-def _iterate_recovered(exchanges: Sequence[_Exchange], failed_exchanges: Sequence[int]) -> Iterator[int]:
+def _iterate_recovered_exchanges(exchanges: Sequence[_Exchange], failed_exchanges: Sequence[int]) -> Iterator[int]:
     """Yield the exchanges in which a text got through that was lost before."""
     lost_texts: set[str] = set()
     failed_numbers = set(failed_exchanges)
@@ -174,9 +179,9 @@ def _build_steps(exchange: _Exchange) -> Iterator[tuple[float, list[Step | Gap]]
         steps: list[Step | Gap] = [_build_message_step(message, robot)]
         if message.delivered is not None and not message.to_partner:
             inner_steps = list(iterate_inner_steps(recording, exchange.sent))
-            steps += inner_steps[:MOST_CALL_STEPS]
-            if len(inner_steps) > MOST_CALL_STEPS:
-                steps.append(Gap(len(inner_steps) - MOST_CALL_STEPS, "step"))
+            steps += inner_steps[:MAX_CALL_STEPS]
+            if len(inner_steps) > MAX_CALL_STEPS:
+                steps.append(Gap(len(inner_steps) - MAX_CALL_STEPS, "step"))
             if not exchange.answers:
                 steps.append(Step("silence", "responder", robot, "– no answer –"))
         yield message.t, steps
@@ -199,11 +204,11 @@ def _build_message_step(message: Message, robot: str) -> Step:
 
 def iterate_inner_steps(recording: Recording, message: int) -> Iterator[Step]:
     """Yield the calls and agent messages until the robot's message was answered; for -1, those before any message."""
-    calls = sorted((call for call in recording.calls if call.message == message), key=_position_of)
+    calls = sorted((call for call in recording.calls if call.message == message), key=_get_position)
     start_index, last_shown_time = 0, recording.messages[message].t if message >= 0 else 0.0
     for position, agent_message in enumerate(recording.agent_messages):
         if agent_message.message == message:
-            end_index = bisect_right(calls, position, start_index, key=_position_of)
+            end_index = bisect_right(calls, position, start_index, key=_get_position)
             yield from _iterate_call_steps(calls[start_index:end_index])
             start_index = end_index
             kind: StepKind = "call" if agent_message.reply_to is None else "return"
@@ -218,7 +223,7 @@ def iterate_inner_steps(recording: Recording, message: int) -> Iterator[Step]:
     yield from _iterate_call_steps(calls[start_index:])
 
 
-def _position_of(call: Call) -> int:
+def _get_position(call: Call) -> int:
     return call.before
 
 

@@ -29,9 +29,9 @@ matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDe
 
 #: Inches. A phone shows it 390 pixels wide, with the smallest type 11 pixels high.
 WIDTH = 3.9
-_SMALLEST = 8.0  # points
+_MIN_FONT_SIZE = 8.0  # points
 _CHARACTERS = 15.2  # characters of a subtitle in an inch
-_MOST_PIXELS = 6_000_000
+_MAX_PIXELS = 6_000_000
 
 INK = "#1c2630"
 FAINT = "#5d6873"
@@ -52,7 +52,7 @@ def create_figure(height: float, title: str, subtitle: str = "", width: float = 
 
     Very large figures get a lower resolution to save memory.
     """
-    dpi = min(DPI, math.sqrt(_MOST_PIXELS / (width * height)))
+    dpi = min(DPI, math.sqrt(_MAX_PIXELS / (width * height)))
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     write_text(figure, 0.08, height - 0.08, to_one_line(title, int(width * 10)), size=10, bold=True, va="top")
     lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * _CHARACTERS), max_lines=2, placeholder=" …")
@@ -99,13 +99,13 @@ def add_axes(figure: Figure, left: float, bottom: float, width: float, height: f
 
 def set_tick_size(axes: Axes, size: float = 8) -> None:
     """Set the size of the tick labels, in points."""
-    axes.tick_params(labelsize=max(size, _SMALLEST), labelfontfamily="DejaVu Sans")
+    axes.tick_params(labelsize=max(size, _MIN_FONT_SIZE), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
 def load_font(size: float, *, bold: bool = False) -> FontProperties:
     """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
-    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _SMALLEST))
+    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _MIN_FONT_SIZE))
 
 
 def replace_missing_glyphs(text: str) -> str:

@@ -34,7 +34,7 @@ from service.reports.plots.track_images import TrackImage, collect_track_images,
 
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.74
 _ALONG, _GAP = 1.15, 0.62  # inches: the curve, and the gap to the floor
-_MOST_BINS = 12
+_MAX_BINS = 12
 _MARGIN = 60.0
 
 
@@ -71,10 +71,10 @@ def draw_track(
 def compute_accuracy_curve(images: Sequence[TrackImage]) -> Curve:
     """Return the fraction correct in at most twelve sections of equal length, at the middle of each."""
     first_distance, last_distance = min(item.distance for item in images), max(item.distance for item in images)
-    length = max((last_distance - first_distance) / _MOST_BINS, 1.0)
+    length = max((last_distance - first_distance) / _MAX_BINS, 1.0)
     bins: dict[int, list[bool]] = {}
     for item in images:
-        bins.setdefault(min(int((item.distance - first_distance) / length), _MOST_BINS - 1), []).append(item.right)
+        bins.setdefault(min(int((item.distance - first_distance) / length), _MAX_BINS - 1), []).append(item.right)
     bin_numbers = sorted(bins)
     counts = [(sum(bins[place]), len(bins[place])) for place in bin_numbers]
     intervals = [compute_wilson_interval(*pair) for pair in counts]

@@ -15,7 +15,7 @@ from service.grading.judging.geometry import locate_part
 from service.reports.plots.sensor_images import is_right
 from sim.recording import Recording
 
-_SHORTEST_TRACK = 60.0  # mm, the least extent of a track
+_MIN_TRACK_LENGTH = 60.0  # mm, the least extent of a track
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ def find_tracks(predictions: Sequence[Prediction], trials: Sequence[TrialResult]
         positions = [
             locate_part(trials[index].recording, "left", s.image.pose) for s in predictions if s.trial == index
         ]
-        if len(positions) > 2 and max(math.dist(positions[0], place) for place in positions) >= _SHORTEST_TRACK:
+        if len(positions) > 2 and max(math.dist(positions[0], place) for place in positions) >= _MIN_TRACK_LENGTH:
             track_indices.append(index)
     return tuple(track_indices)
 

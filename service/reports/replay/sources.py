@@ -14,7 +14,7 @@ from service.reports.display_text import to_display_text, to_one_line
 from sim.recording import Fault
 from submissions.submission import Notebook, Submission
 
-_MOST_LINES, _LONGEST_LINE = 3000, 300
+_MAX_LINES, _MAX_LINE_LENGTH = 3000, 300
 _OUTPUT_CALL = re.compile(r"\b(?:(print)|say|speak)\w*\s*\(\s*")
 _LITERAL = re.compile(r"([fF]?)(['\"])(?!\2\2)([^'\"\\{}]*)(\2\s*\))?")
 _IMAGE = "IMG_DATA"
@@ -41,7 +41,7 @@ class ShownSource:
     def to_json(self) -> dict[str, object]:
         """Return the source as replay data, with long lines and files shortened."""
         lines = self.text.rstrip("\n").split("\n")
-        shown_lines = [to_display_text(line[:_LONGEST_LINE], _LONGEST_LINE) for line in lines[:_MOST_LINES]]
+        shown_lines = [to_display_text(line[:_MAX_LINE_LENGTH], _MAX_LINE_LENGTH) for line in lines[:_MAX_LINES]]
         return {"name": to_one_line(self.name, 80), "lines": shown_lines, "more": len(lines) - len(shown_lines)}
 
 
@@ -124,8 +124,8 @@ def _is_robot_cell(cell: str) -> bool:
 
 
 def _iterate_output_texts(text: str) -> Iterator[tuple[int, _OutputText]]:
-    for number, line in enumerate(text.split("\n")[:_MOST_LINES], start=1):
-        code = line[:_LONGEST_LINE].lstrip()
+    for number, line in enumerate(text.split("\n")[:_MAX_LINES], start=1):
+        code = line[:_MAX_LINE_LENGTH].lstrip()
         if code.startswith(("#", "def ")):
             continue
         for call in _OUTPUT_CALL.finditer(code):

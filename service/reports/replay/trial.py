@@ -26,14 +26,14 @@ from sim.recording_values import collect_printed_lines, get_pose_at, get_recorde
 from sim.robot import LightSensor
 
 #: Of each kind of event, in one trial.
-_MOST_EVENTS = 2000
-_MOST_IMAGES = 1000
-_LONGEST_TEXT, _MOST_LINES = 600, 12
+_MAX_EVENTS = 2000
+_MAX_IMAGES = 1000
+_MAX_TEXT_LENGTH, _MAX_LINES = 600, 12
 #: Steps in one unit of a column. A canvas shows nothing smaller.
 _FINE_COLUMNS = frozenset({"x", "y", "heading"})
 _STEPS_OF_FINE, _STEPS = 100, 10
 #: The largest number of steps. A program can set the position of a wheel to any number.
-_MOST_STEPS = 2.0**52
+_MAX_EXACT_STEPS = 2.0**52
 
 
 def columns_to_json(ticks: Ticks) -> dict[str, dict[str, Any]]:
@@ -54,7 +54,9 @@ def columns_to_json(ticks: Ticks) -> dict[str, dict[str, Any]]:
 def _encode_differences(values: NDArray[np.float64], steps_per_unit: int) -> list[int | None]:
     """Return the difference of each value from the previous one, the first from 0; None for missing values."""
     is_known = np.isfinite(values)
-    clipped_values = np.clip(np.where(is_known, values, 0), -_MOST_STEPS / steps_per_unit, _MOST_STEPS / steps_per_unit)
+    clipped_values = np.clip(
+        np.where(is_known, values, 0), -_MAX_EXACT_STEPS / steps_per_unit, _MAX_EXACT_STEPS / steps_per_unit
+    )
     steps = np.rint(clipped_values * steps_per_unit).astype(np.int64)
     encoded_differences: list[int | None] = [None] * len(values)
     differences = np.diff(steps[is_known], prepend=0).tolist()
@@ -74,7 +76,7 @@ def trial_to_json(
     recording = trial.recording
     events, omitted_count = _collect_events(recording, sources, language)
     messages = sorted(_iterate_messages(recording, sources, language), key=lambda message: message["t"])
-    omitted_count += max(0, len(messages) - _MOST_EVENTS)
+    omitted_count += max(0, len(messages) - _MAX_EVENTS)
     predictions = [each for result in criteria for each in result.predictions if each.trial == index]
     return {
         "trial": index + 1,
@@ -86,7 +88,7 @@ def trial_to_json(
         "obstacles": recording.obstacles,
         "beacon": recording.beacon,
         "robots": [_robot_to_json(name, own, predictions) for name, own in iterate_robots(recording)],
-        "messages": messages[:_MOST_EVENTS],
+        "messages": messages[:_MAX_EVENTS],
         "events": events,
         "left_out": omitted_count,
         "lost": _collect_losses(recording, criteria, index),
@@ -121,7 +123,7 @@ def _robot_to_json(name: str, recording: Recording, predictions: Sequence[Predic
         "end": _pose_to_json(recording.end),
         "columns": columns_to_json(recording.ticks),
         "pen": recording.pen,
-        "images": [_image_to_json(image, predictions) for image in recording.images[:_MOST_IMAGES]],
+        "images": [_image_to_json(image, predictions) for image in recording.images[:_MAX_IMAGES]],
     }
 
 
@@ -165,7 +167,7 @@ def _collect_events(recording: Recording, sources: Sources, language: Language) 
                 _event_to_json(
                     line.t, robot, "printed", line.text, sources.find_writing_line(line.text) if is_students else None
                 )
-                for line in printed[:_MOST_EVENTS]
+                for line in printed[:_MAX_EVENTS]
             ],
             [
                 _event_to_json(
@@ -175,11 +177,11 @@ def _collect_events(recording: Recording, sources: Sources, language: Language) 
                     line.text,
                     sources.find_writing_line(line.text, is_spoken=True) if is_students else None,
                 )
-                for line in robot_recording.spoken[:_MOST_EVENTS]
+                for line in robot_recording.spoken[:_MAX_EVENTS]
             ],
             [
                 {**_event_to_json(touch.t, robot, "touched", touch.what), "pose": _pose_to_json(touch.pose)}
-                for touch in robot_recording.touches[:_MOST_EVENTS]
+                for touch in robot_recording.touches[:_MAX_EVENTS]
             ],
             [
                 _event_to_json(
@@ -189,7 +191,7 @@ def _collect_events(recording: Recording, sources: Sources, language: Language) 
                     f"{fault.message} ({describe_place(fault, language)})" if fault.place else fault.message,
                     sources.find_fault_line(fault),
                 )
-                for fault in robot_recording.faults[:_MOST_EVENTS]
+                for fault in robot_recording.faults[:_MAX_EVENTS]
             ],
         )
         for entries, kind_events in zip(
@@ -207,7 +209,7 @@ def _event_to_json(t: float, party: str, kind: str, text: str, place: Place | No
         "t": t,
         "who": to_one_line(party, 60),
         "kind": kind,
-        "text": to_display_text(text, _LONGEST_TEXT, lines=_MOST_LINES),
+        "text": to_display_text(text, _MAX_TEXT_LENGTH, lines=_MAX_LINES),
     }
     return {**data, **_place_to_json(place)}
 
@@ -230,11 +232,11 @@ def _iterate_messages(recording: Recording, sources: Sources, language: Language
                 "t": message.t,
                 "from": robot if from_robot else responder,
                 "to": receiver if from_robot else robot,
-                "text": abbreviate_message(message.text, _LONGEST_TEXT),
+                "text": abbreviate_message(message.text, _MAX_TEXT_LENGTH),
                 "arrived": message.delivered,
             }
             if message.arrived_as is not None:
-                data["arrived_as"] = abbreviate_message(message.arrived_as, _LONGEST_TEXT)
+                data["arrived_as"] = abbreviate_message(message.arrived_as, _MAX_TEXT_LENGTH)
             loss_text = describe_loss_fully(message, language)
             if loss_text:
                 data["befell"] = loss_text
@@ -246,7 +248,7 @@ def _iterate_messages(recording: Recording, sources: Sources, language: Language
             "t": agent_message.t,
             "from": to_one_line(agent_message.sender, 60),
             "to": to_one_line(agent_message.receiver, 60),
-            "text": abbreviate_message(agent_message.text, _LONGEST_TEXT),
+            "text": abbreviate_message(agent_message.text, _MAX_TEXT_LENGTH),
             "arrived": None if agent_message.note else agent_message.t,
         }
         yield {**data, "befell": describe_note(agent_message.note, language)} if agent_message.note else data
@@ -266,7 +268,7 @@ def _collect_losses(recording: Recording, criteria: Sequence[CriterionResult], i
                     "t": t,
                     "pose": _pose_to_json(item.pose or get_pose_at(recording, t)),
                     "title": to_one_line(result.title, 120),
-                    "text": to_display_text(item.message or result.message, _LONGEST_TEXT, lines=_MOST_LINES),
+                    "text": to_display_text(item.message or result.message, _MAX_TEXT_LENGTH, lines=_MAX_LINES),
                     "marks": f"{format_decimal(result.marks)} / {format_decimal(result.max_marks)}",
                 }
             )

@@ -38,9 +38,9 @@ _JobColumns = tuple[
     Job, str, str, str, str, AssignmentVersion, int, float | None, str | None, int, int | None, int | None,
     int | None, str | None, int | None,
 ]  # fmt: skip
-_MOST_LISTED = 50
+_MAX_LISTED = 50
 #: Number of newest ids considered for a "did you mean" hint.
-_MOST_COMPARED = 1000
+_MAX_COMPARED = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,7 @@ def find_previous_job(session: Session, job_id: str) -> str:
 
 def list_batches(session: Session, course_id: int | None = None) -> list[BatchLine]:
     """Return the newest batches, newest first, of all courses or of one."""
-    query = select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(_MOST_LISTED)
+    query = select(Batch).order_by(Batch.created_at.desc(), Batch.id).limit(_MAX_LISTED)
     if course_id is not None:
         query = query.where(Batch.course_id == course_id)
     return _build_batch_lines(session, session.scalars(query).all())
@@ -340,7 +340,7 @@ def _find_by_prefix(
 ) -> str:
     matches = session.scalars(select(column).where(column.startswith(prefix, autoescape=True)).limit(2)).all()
     if not matches:
-        newest_ids = session.scalars(select(column).order_by(newest_column.desc()).limit(_MOST_COMPARED))
+        newest_ids = session.scalars(select(column).order_by(newest_column.desc()).limit(_MAX_COMPARED))
         raise UsageError(f"there is no {subject} {prefix!r}{suggest_name(prefix, newest_ids)}")
     if len(matches) > 1:
         raise UsageError(f"more than one {subject} begins with {prefix!r}; give more of its id")

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 Read = TypeVar("Read")
 #: Number of submissions fetched at once.
-_AT_ONCE = 10
+_CHUNK_SIZE = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +247,7 @@ def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator
     """
     query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
     query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
-    for job_id, packed_submission in session.execute(query, execution_options={"yield_per": _AT_ONCE}):
+    for job_id, packed_submission in session.execute(query, execution_options={"yield_per": _CHUNK_SIZE}):
         yield job_id, _unpack_stored(unpack_submission, packed_submission, "submission", job_id)
 
 

@@ -37,7 +37,7 @@ def preview_intake(
     """Return a preview of each grading request, in their order.
 
     For the assignments in ``hidden_assignments``, whose students' names are hidden, it does not depend on what the
-    student submitted. Otherwise the files of a row under each name in turn would tell whose row it is.
+    student submitted. Otherwise an instructor could submit the files of a row under each name and find out the student.
     """
     students = Students(session, course_id)
     versions = {id(each.assignment): each.assignment for each in grading_requests}

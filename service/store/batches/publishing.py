@@ -51,14 +51,14 @@ def publish_batch(session: Session, batch_id: str, *, actor: str, includes_unjud
 
 
 def publish_grade(session: Session, job_id: str, *, actor: str, includes_unjudged: bool = False) -> PublicationCounts:
-    """Publish the grade of one submission, selected by a job, like ``publish``."""
+    """Publish the grade of one submission, selected by a job, like ``publish_batch``."""
     return _publish_grades(
         session, select(Job.submission_id).where(Job.id == job_id), actor=actor, includes_unjudged=includes_unjudged
     )
 
 
 def preview_publication(session: Session, batch_id: str) -> PublicationPreview:
-    """Return the effect of ``publish`` on a batch, without ``anyway``. Read-only."""
+    """Return the effect of ``publish_batch`` without unjudged grades. Read-only."""
     submission_ids = _select_batch_submissions(batch_id)
     plan = _build_plan(
         session, session.scalars(_select_gradings(submission_ids)).all(), submission_ids, includes_unjudged=False

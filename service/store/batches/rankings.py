@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from submissions.criteria.timing import Ranking
 
 #: Number of jobs per query: databases limit the number of parameters.
-_AT_ONCE = 1000
+_CHUNK_SIZE = 1000
 
 
 def build_rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTable]:
@@ -45,8 +45,8 @@ def build_rank_tables(session: Session, lines: Sequence[JobLine]) -> list[RankTa
 
 
 def _split_lines(lines: Sequence[JobLine]) -> Iterator[dict[str, JobLine]]:
-    for start in range(0, len(lines), _AT_ONCE):
-        yield {line.id: line for line in lines[start : start + _AT_ONCE]}
+    for start in range(0, len(lines), _CHUNK_SIZE):
+        yield {line.id: line for line in lines[start : start + _CHUNK_SIZE]}
 
 
 def _load_contents(session: Session, lines: Sequence[JobLine]) -> Iterator[bytes]:

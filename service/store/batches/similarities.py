@@ -18,7 +18,7 @@ from service.store.engine import Store
 from service.store.grades import current_grades, results
 
 #: Maximum number of submissions compared in a request; this takes some seconds.
-MOST_AT_ONCE = 300
+MAX_COMPARED_SUBMISSIONS = 300
 
 
 def find_similar_submissions(

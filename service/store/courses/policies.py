@@ -157,7 +157,7 @@ def load_visibilities(session: Session, job_id: str) -> frozenset[str]:
 
 
 def load_visibilities_by_job(session: Session, job_ids: Collection[str]) -> dict[str, frozenset[str]]:
-    """Return ``released`` for several grades, with the same number of statements."""
+    """Return the result of ``load_visibilities`` for several grades, with the same number of statements."""
     query = (
         select(Job.id, Job.published_at, Enrolment.course_id, SubmissionRow.assignment)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)

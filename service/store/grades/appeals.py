@@ -18,7 +18,7 @@ from service.store.states import Standing
 from service.store.web_tables import Appeal
 from sim.errors import UsageError
 
-LONGEST_TEXT = 4000
+MAX_TEXT_LENGTH = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,9 @@ def open_appeal(session: Session, submission_id: int, text: str) -> int:
     Raises UsageError if the student may not see a grade, an appeal is open already, or the text is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
-    if not 0 < len(text) <= LONGEST_TEXT:
+    if not 0 < len(text) <= MAX_TEXT_LENGTH:
         raise UsageError(
-            "the appeal has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
+            "the appeal has %(count)s characters, expected 1 to %(most)s", count=len(text), most=MAX_TEXT_LENGTH
         )
     # Serialises concurrent appeals, so that the second one finds the first open.
     lock_submissions(session, SubmissionRow.id == submission_id)
@@ -76,9 +76,9 @@ def answer_appeal(session: Session, course_id: int, appeal_id: int, text: str, a
     Raises UsageError if the appeal does not exist or is answered, or the text is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
-    if not 0 < len(text) <= LONGEST_TEXT:
+    if not 0 < len(text) <= MAX_TEXT_LENGTH:
         raise UsageError(
-            "the answer has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_TEXT
+            "the answer has %(count)s characters, expected 1 to %(most)s", count=len(text), most=MAX_TEXT_LENGTH
         )
     row = session.get(Appeal, appeal_id, with_for_update={"key_share": True})
     if row is None or _find_course(session, row) != course_id:

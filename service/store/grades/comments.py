@@ -18,7 +18,7 @@ from service.store.models import CriterionResultRow, Job
 from service.store.web_tables import Comment
 from sim.errors import UsageError
 
-LONGEST_COMMENT = 2000
+MAX_COMMENT_LENGTH = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +38,9 @@ def add_comment(session: Session, job_id: str, criterion: str, text: str, actor:
     Raises UsageError for an unknown criterion, or a text that is empty or too long.
     """
     text = text.replace("\r\n", "\n").strip()
-    if not 0 < len(text) <= LONGEST_COMMENT:
+    if not 0 < len(text) <= MAX_COMMENT_LENGTH:
         raise UsageError(
-            "the comment has %(count)s characters, expected 1 to %(most)s", count=len(text), most=LONGEST_COMMENT
+            "the comment has %(count)s characters, expected 1 to %(most)s", count=len(text), most=MAX_COMMENT_LENGTH
         )
     criterion_exists = exists().where(CriterionResultRow.job_id == job_id, CriterionResultRow.criterion == criterion)
     if criterion and not session.scalar(select(criterion_exists)):

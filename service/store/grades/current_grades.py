@@ -32,7 +32,7 @@ class JobStatus(Protocol):
 
 
 class AttemptStatus(JobStatus, Protocol):
-    """Fields of ``JobOutcome``, with the limit that the submission exceeds."""
+    """Fields of ``JobStatus``, with the limit that the submission exceeds."""
 
     @property
     def staff_only(self) -> str | None: ...  # noqa: D102
@@ -70,7 +70,7 @@ def select_counted_submissions(*conditions: ColumnElement[bool]) -> Select[int]:
 
 
 def select_shown_submissions(*conditions: ColumnElement[bool]) -> Select[int]:
-    """Return a query like ``counting`` with one submission for every student.
+    """Return a query like ``select_counted_submissions``, with one submission for every student.
 
     If none counts, it is the newest within the limits, otherwise the newest.
     """

@@ -22,7 +22,7 @@ from service.store.web_tables import Override
 from sim.errors import UsageError
 from submissions.suggestions import suggest_name
 
-LONGEST_REASON = 500
+MAX_REASON_LENGTH = 500
 #: Maximum precision: four digits after the point.
 _FINEST_MARKS = Decimal("0.0001")
 _ZERO = Decimal(0)
@@ -240,11 +240,11 @@ def _replace_override(
     session: Session, submission_id: int, line: CriterionMarks, marks: Decimal | None, reason: str, actor: str
 ) -> None:
     reason = reason.strip()
-    if not 0 < len(reason) <= LONGEST_REASON:
+    if not 0 < len(reason) <= MAX_REASON_LENGTH:
         raise UsageError(
             "the reason has %(count)s characters, expected 1 to %(most)s because students can read it",
             count=len(reason),
-            most=LONGEST_REASON,
+            most=MAX_REASON_LENGTH,
         )
     current_time = now(session)
     if line.override is not None:

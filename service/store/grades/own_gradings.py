@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
 
-_MOST_LISTED = 50
+_MAX_LISTED = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ def list_newest_gradings(session: Session, enrolment_id: int, assignment: str = 
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .where(Job.enrolment_id == enrolment_id, Job.standing == Standing.STANDS)
         .order_by(Job.queued_at.desc(), Job.id)
-        .limit(_MOST_LISTED)
+        .limit(_MAX_LISTED)
     )
     if assignment:
         query = query.where(SubmissionRow.assignment == assignment)

@@ -18,7 +18,7 @@ from service.store.models import Job
 from service.store.revision import needs_newer_code
 from service.store.states import PlotState
 
-MOST_ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 _PREFIX, _SUFFIX = "plot-", ".png"
 
 
@@ -33,7 +33,7 @@ def claim_plots(store: Store, lease_seconds: float) -> str | None:
             return None
         current_time = now(session)
         is_due = (Job.plots == PlotState.DUE, Job.plots_due_at <= current_time)
-        exhausted_attempts = (*is_due, Job.plots_attempt >= MOST_ATTEMPTS)
+        exhausted_attempts = (*is_due, Job.plots_attempt >= MAX_ATTEMPTS)
         session.execute(
             update(Job)
             .where(match_and_lock_jobs(*exhausted_attempts), *exhausted_attempts)

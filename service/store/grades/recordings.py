@@ -22,7 +22,7 @@ from sim.recording import COLUMNS, Image, Recording, Ticks
 #: Maximum compressed size of one grade's recordings, so that excessive output does not fill the database.
 GRADE_BYTES = 64_000_000
 #: Minimum size limit of one recording, regardless of their number.
-SMALLEST_CAP = 256_000
+MIN_RECORDING_BYTES = 256_000
 _TEXT_KEPT = 2000
 
 _Bytes = NDArray[np.uint8]
@@ -38,7 +38,7 @@ class StoredRecording:
 
 def compute_size_limit(trials: int) -> int:
     """Return the maximum size in bytes of each recording of a grade."""
-    return max(SMALLEST_CAP, GRADE_BYTES // max(1, trials))
+    return max(MIN_RECORDING_BYTES, GRADE_BYTES // max(1, trials))
 
 
 def encode_within_limit(recording: Recording, size_limit: int) -> StoredRecording:

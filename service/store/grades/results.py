@@ -93,7 +93,7 @@ def load_grade(session: Session, job_id: str) -> Grade:
 
 
 def load_each_grade(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Grade]]:
-    """Yield the grades like ``load`` for jobs that have one, ordered by id, with a fixed number of statements.
+    """Yield the grades of jobs that have one, ordered by id. Executes a fixed number of statements.
 
     Only the recordings of one job are in memory at a time.
     """
@@ -103,7 +103,7 @@ def load_each_grade(session: Session, job_ids: Collection[str]) -> Iterator[tupl
 
 
 def load_grade_texts(session: Session, job_id: str) -> Grade:
-    """Load a grade like ``load``, but with recordings without ticks and pixels."""
+    """Load a grade like ``load_grade``, but with recordings without ticks and pixels."""
     return _require_grade(
         _apply_staff_changes(session, [job_id], _load_original_grades(session, [job_id], texts_from_bytes)), job_id
     )

@@ -14,7 +14,7 @@ from service.store.grades import current_grades, overrides
 from service.store.models import CriterionResultRow
 
 #: Number of jobs per query: databases limit the number of parameters.
-_AT_ONCE = 1000
+_CHUNK_SIZE = 1000
 
 
 class MarkedLine(Protocol):
@@ -45,8 +45,8 @@ def load_marked_submissions(session: Session, lines: Sequence[MarkedLine]) -> li
     graded_lines = [line for line in lines if current_grades.is_for_students(line)]
     criteria: dict[str, list[MarkedCriterion]] = {line.id: [] for line in graded_lines}
     max_marks_by_job = dict.fromkeys(criteria, Decimal(0))
-    for start in range(0, len(graded_lines), _AT_ONCE):
-        job_ids = [line.id for line in graded_lines[start : start + _AT_ONCE]]
+    for start in range(0, len(graded_lines), _CHUNK_SIZE):
+        job_ids = [line.id for line in graded_lines[start : start + _CHUNK_SIZE]]
         overrides_by_job = overrides.load_overrides(session, job_ids)
         rows = session.execute(
             select(

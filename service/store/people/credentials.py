@@ -25,7 +25,7 @@ from service.store.web_tables import Credential, LtiCourse
 SESSION_LIFETIME = timedelta(days=7)
 LINK_LIFETIME = timedelta(days=2)
 #: Per person: a new session ends the oldest one; further tokens are rejected.
-MOST_SESSIONS, MOST_TOKENS = 20, 20
+MAX_SESSIONS, MAX_TOKENS = 20, 20
 #: Prefixes of secrets, so that a leaked one can be recognised.
 _PREFIXES = {CredentialKind.LINK: "rml_", CredentialKind.SESSION: "rms_", CredentialKind.TOKEN: "rmt_"}
 _RETENTION = timedelta(days=30)
@@ -409,7 +409,7 @@ def _end_oldest_sessions(session: Session, person_id: int, current_time: datetim
         *_match_valid(current_time),
     )
     newest_query = select(Credential.id).where(*conditions).order_by(Credential.created_at.desc(), Credential.id)
-    kept_ids = list(session.scalars(newest_query.limit(MOST_SESSIONS)))
+    kept_ids = list(session.scalars(newest_query.limit(MAX_SESSIONS)))
     _revoke(session, *conditions, Credential.id.not_in(kept_ids))
 
 

@@ -29,12 +29,12 @@ _LAUNCH_LIFETIME = timedelta(minutes=10)
 
 
 #: Longest id of a subject, context or deployment. Longer ones are rejected, because cut ones could collide.
-LONGEST_ID = 250
-_LONGEST_STUDENT = 500
+MAX_ID_LENGTH = 250
+_MAX_STUDENT_ID_LENGTH = 500
 #: Longest issuer and client id: a PostgreSQL index contains both.
-LONGEST_REGISTERED = 255
+MAX_REGISTERED_LENGTH = 255
 #: Maximum number of pending launches of a platform. Anybody can start one, so the oldest are dropped.
-MOST_PENDING = 10_000
+MAX_PENDING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,8 @@ def register_platform(session: Session, registration: Registration) -> int:
     or http://.
     """
     for kind, value in (("issuer", registration.issuer), ("client", registration.client_id)):
-        if len(value) > LONGEST_REGISTERED:
-            raise UsageError(f"the platform's {kind} is longer than {LONGEST_REGISTERED} characters")
+        if len(value) > MAX_REGISTERED_LENGTH:
+            raise UsageError(f"the platform's {kind} is longer than {MAX_REGISTERED_LENGTH} characters")
     deployments = sorted(registration.deployments)
     for deployment in deployments:
         _check_id("deployment", deployment)
@@ -166,13 +166,13 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
 def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
     """Return a new state and nonce, each valid once and for a few minutes.
 
-    At most ``MOST_PENDING`` launches of a platform are kept.
+    At most ``MAX_PENDING`` launches of a platform are kept.
     """
     _lock_platform(session, platform)
     current_time, is_same_platform = now(session), LtiLaunch.platform_id == platform.id
     newest_first = select(LtiLaunch.state_sha256).where(is_same_platform).order_by(LtiLaunch.expires_at.desc())
     is_expired = or_(
-        LtiLaunch.expires_at < current_time, LtiLaunch.state_sha256.in_(newest_first.offset(MOST_PENDING - 1))
+        LtiLaunch.expires_at < current_time, LtiLaunch.state_sha256.in_(newest_first.offset(MAX_PENDING - 1))
     )
     session.execute(delete(LtiLaunch).where(is_same_platform, is_expired).execution_options(synchronize_session=False))
     state, nonce = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
@@ -251,8 +251,8 @@ def enrol_subject(
     Raises UsageError if the id belongs to another person or is too long.
     """
     _check_id("subject", subject)
-    if len(student.id) > _LONGEST_STUDENT:
-        raise UsageError("the platform's user ID is longer than %(most)s characters", most=_LONGEST_STUDENT)
+    if len(student.id) > _MAX_STUDENT_ID_LENGTH:
+        raise UsageError("the platform's user ID is longer than %(most)s characters", most=_MAX_STUDENT_ID_LENGTH)
     _lock_platform(session, platform)
     session.get_one(Course, course_id, with_for_update={"key_share": True})
     is_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
@@ -277,7 +277,7 @@ def _create_enrolment(session: Session, course_id: int, student: Student, person
     if not _is_unclaimed(session, row):
         raise UsageError(
             "another person already has the ID '%(id)s' in this course; ask an operator of Robomark",
-            id=student.id[:LONGEST_ID],
+            id=student.id[:MAX_ID_LENGTH],
         )
     # Existing links to it would sign in another user as this person.
     credentials.revoke_all(session, row.person_id)
@@ -334,8 +334,8 @@ def _lock_platform(session: Session, platform: Platform) -> None:
 
 
 def _check_id(kind: str, value: str) -> None:
-    if len(value) > LONGEST_ID:
-        raise UsageError("the platform's %(kind)s ID is longer than %(most)s characters", kind=kind, most=LONGEST_ID)
+    if len(value) > MAX_ID_LENGTH:
+        raise UsageError("the platform's %(kind)s ID is longer than %(most)s characters", kind=kind, most=MAX_ID_LENGTH)
 
 
 def find_course_link(session: Session, course_id: int) -> CourseLink | None:

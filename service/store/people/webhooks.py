@@ -19,8 +19,8 @@ from service.store.outbox import WebhookEvent
 from service.store.web_tables import Delivery, Webhook
 from sim.errors import UsageError
 
-LONGEST_URL = 1000
-MOST_WEBHOOKS = 20
+MAX_URL_LENGTH = 1000
+MAX_WEBHOOKS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,8 @@ def create_webhook(session: Session, course_id: int, url: str, events: Collectio
     if not events or not set(events) <= set(event_names):
         raise UsageError(f"events: expected some of {', '.join(event_names)}")
     is_active = (Webhook.course_id == course_id, Webhook.revoked_at.is_(None))
-    if (session.scalar(select(func.count()).select_from(Webhook).where(*is_active)) or 0) >= MOST_WEBHOOKS:
-        raise UsageError(f"this course has {MOST_WEBHOOKS} webhooks; revoke one first")
+    if (session.scalar(select(func.count()).select_from(Webhook).where(*is_active)) or 0) >= MAX_WEBHOOKS:
+        raise UsageError(f"this course has {MAX_WEBHOOKS} webhooks; revoke one first")
     secret = secrets.token_hex(32)
     chosen_events = [event for event in event_names if event in events]
     row = Webhook(course_id=course_id, url=url, secret=secret, events=chosen_events, created_at=now(session))
@@ -115,7 +115,7 @@ def _check_url(url: str) -> None:
         is_valid = parts.scheme in ("http", "https") and parts.hostname and parts.port != 0
     except ValueError:
         is_valid = False
-    if not is_valid or not url.isascii() or not url.isprintable() or " " in url or len(url) > LONGEST_URL:
+    if not is_valid or not url.isascii() or not url.isprintable() or " " in url or len(url) > MAX_URL_LENGTH:
         raise UsageError("url: expected http:// or https:// with a name, in ASCII")
     if parts.username is not None or parts.fragment:
         raise UsageError("url: expected neither a user nor a fragment in it")

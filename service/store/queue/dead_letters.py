@@ -12,7 +12,7 @@ from service.store.models import Batch, Course, Enrolment, Job
 from service.store.states import JobQueue, JobState
 
 #: Maximum number listed, newest first.
-MOST_LISTED = 100
+MAX_LISTED = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def list_dead_letters(session: Session) -> list[DeadLetter]:
         .outerjoin(Batch, Job.batch_id == Batch.id)
         .where(Job.state == JobState.DEAD)
         .order_by(Job.finished_at.desc(), Job.id)
-        .limit(MOST_LISTED)
+        .limit(MAX_LISTED)
     )
     return [
         DeadLetter(

@@ -33,7 +33,7 @@ from sim.errors import Cancelled, HostError
 if TYPE_CHECKING:
     from service.store.grades import results
 
-_LONGEST_BACKOFF = timedelta(hours=1)
+_MAX_BACKOFF = timedelta(hours=1)
 #: Smaller clock corrections are normal and ignored.
 _TOLERANCE = timedelta(seconds=2)
 
@@ -90,7 +90,7 @@ class RetryPolicy:
 
     def wait(self, attempt: int) -> timedelta:
         """Return the delay after attempt number ``attempt`` (1 is the first)."""
-        return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _LONGEST_BACKOFF)
+        return min(timedelta(seconds=self.backoff_seconds * 2.0 ** min(attempt - 1, 20)), _MAX_BACKOFF)
 
 
 def enqueue(session: Session, job: Job, current_time: datetime) -> str:
@@ -168,7 +168,7 @@ def claim_job(store: Store, worker: str, lease_seconds: float) -> Claim | None:
 
 @retry_conflicts
 def renew_lease(store: Store, claim: Claim, lease_seconds: float, progress: float) -> None:
-    """Renew the lease and store the progress (0 to 1). Raises Fenced if the worker no longer owns the job."""
+    """Renew the lease and store the progress (0 to 1). Raises LeaseLost if the worker no longer owns the job."""
     with store.transaction() as session:
         current_time = now(session)
         values = {
@@ -189,8 +189,8 @@ def finish_job(
 ) -> None:
     """Store the grade with all its rows and finish the job, in one transaction.
 
-    ``trials_at`` and ``graded_at`` are the times when the last trial and all marking ended. Raises Fenced, and stores
-    nothing, if the worker no longer owns the job.
+    ``trials_at`` and ``graded_at`` are the times when the last trial and all marking ended. Raises LeaseLost, and
+    stores nothing, if the worker no longer owns the job.
     """
     # Imported here, because other operations on jobs do not read recordings.
     from service.store.grades import results
@@ -233,7 +233,7 @@ def finish_job(
 def finish_job_from_cache(store: Store, claim: Claim) -> bool:
     """Finish the job with the grade of an identical one if there is one and a new run was not requested.
 
-    Raises Fenced if the worker no longer owns the job.
+    Raises LeaseLost if the worker no longer owns the job.
     """
     secret = load_secret(store)
     with store.transaction() as session:
@@ -262,7 +262,7 @@ def finish_job_from_cache(store: Store, claim: Claim) -> bool:
 def fail_job(store: Store, claim: Claim, reason: str, retry: RetryPolicy) -> JobState:
     """Handle a host fault: the job is queued for another attempt, or dead after the last one.
 
-    Raises Fenced if the worker no longer owns the job.
+    Raises LeaseLost if the worker no longer owns the job.
     """
     with store.transaction() as session:
         return apply_host_fault(session, claim, reason, retry, now(session))
@@ -287,7 +287,7 @@ def apply_host_fault(
 
 @retry_conflicts
 def give_up_job(store: Store, claim: Claim, reason: str) -> None:
-    """Mark a job as dead without further attempts. Raises Fenced if the worker no longer owns it."""
+    """Mark a job as dead without further attempts. Raises LeaseLost if the worker no longer owns it."""
     with store.transaction() as session:
         _apply_owned_transition(session, GIVE_UP, claim, now(session), {"error": reason})
         outbox.emit_job_ended(session, claim.job_id)
@@ -380,7 +380,7 @@ def _apply_transition(
 def _apply_owned_transition(
     session: Session, transition: Transition, claim: Claim, current_time: datetime, values: dict[str, Any]
 ) -> None:
-    """Apply the transition to an owned job. Raises Fenced if the worker no longer owns it."""
+    """Apply the transition to an owned job. Raises LeaseLost if the worker no longer owns it."""
     if not _apply_transition(
         session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), current_time, values
     ):

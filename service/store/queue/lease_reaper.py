@@ -21,7 +21,7 @@ from service.store.queue.scheduling import match_claimable_jobs
 from service.store.states import JobQueue, JobState
 
 #: Databases limit the number of parameters of a statement.
-_AT_ONCE = 500
+_CHUNK_SIZE = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +85,8 @@ def mark_not_notified(store: Store, job_ids: Sequence[str]) -> None:
 
 def _set_notified(session: Session, job_ids: Sequence[str], notified_at: datetime | None) -> None:
     job_ids = sorted(job_ids)
-    for start in range(0, len(job_ids), _AT_ONCE):
-        conditions = (Job.id.in_(job_ids[start : start + _AT_ONCE]), Job.state == JobState.QUEUED)
+    for start in range(0, len(job_ids), _CHUNK_SIZE):
+        conditions = (Job.id.in_(job_ids[start : start + _CHUNK_SIZE]), Job.state == JobState.QUEUED)
         options = {"synchronize_session": False}
         statement = update(Job).where(match_and_lock_jobs(*conditions), *conditions).values(notified_at=notified_at)
         session.execute(statement, execution_options=options)

@@ -23,7 +23,7 @@ from service.store.states import UNFINISHED, BatchState, JobQueue, JobState, Plo
 
 #: Durations cover the newest jobs that ended within this time.
 TIMES_WINDOW = timedelta(hours=1)
-MOST_TIMES = 2000
+MAX_TIMES = 2000
 PACE_WINDOW = timedelta(minutes=5)
 #: Older starts are ignored when deciding whether the queue is stuck.
 _RECENT_PERIOD = timedelta(hours=1)
@@ -184,7 +184,7 @@ def _load_times(session: Session) -> dict[str, list[float]]:
         select(Job.phases)
         .where(Job.finished_at > now(session) - TIMES_WINDOW, Job.state == JobState.DONE)
         .order_by(Job.finished_at.desc())
-        .limit(MOST_TIMES)
+        .limit(MAX_TIMES)
     )
     times: dict[str, list[float]] = {span: [] for span in phases.SPANS}
     for phase_times in session.scalars(recent_phases):

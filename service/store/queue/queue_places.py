@@ -19,9 +19,9 @@ from service.store.queue.scheduling import match_claimable_jobs, select_recent_j
 from service.store.states import JobQueue, JobState
 
 #: Estimates use the mean of this number of recent gradings.
-_MOST_MEASURED = 20
+_MAX_MEASURED_JOBS = 20
 #: Maximum progress shown for a grading that takes longer than usual.
-_MOST_PROGRESS = 0.95
+_MAX_PROGRESS = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def estimate_places(session: Session, job_ids: Collection[str]) -> dict[str, Que
         elapsed_seconds = (
             (current_time - job.started_at).total_seconds() if job.state is JobState.RUNNING and job.started_at else 0.0
         )
-        progress = min(elapsed_seconds / job_seconds, _MOST_PROGRESS) if job_seconds else 0.0
+        progress = min(elapsed_seconds / job_seconds, _MAX_PROGRESS) if job_seconds else 0.0
         places[job.id] = QueuePlace(
             job_count, job_count * job_seconds / slots + job_seconds * (1 - progress), len(live_workers), progress
         )
@@ -97,7 +97,10 @@ def _count_jobs_before(session: Session, job_ids: Collection[str], current_time:
 def _measure_usual_seconds(session: Session) -> float | None:
     was_graded = (Job.state == JobState.DONE, Job.copied_from.is_(None), Job.started_at.is_not(None))
     query = (
-        select(Job.started_at, Job.finished_at).where(*was_graded).order_by(Job.started_at.desc()).limit(_MOST_MEASURED)
+        select(Job.started_at, Job.finished_at)
+        .where(*was_graded)
+        .order_by(Job.started_at.desc())
+        .limit(_MAX_MEASURED_JOBS)
     )
     durations = [
         (finished - started).total_seconds() for started, finished in session.execute(query) if started and finished

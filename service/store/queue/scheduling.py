@@ -17,7 +17,7 @@ from service.store.states import BatchState, JobQueue, JobState
 #: Shares count only jobs started within this time, so earlier use is no disadvantage.
 SHARE_WINDOW = timedelta(seconds=60)
 #: One in this number of started jobs is from a batch, even if interactive jobs wait.
-BATCH_EVERY = 5
+BATCH_JOB_INTERVAL = 5
 #: Time for which a job that failed on one worker is reserved for the other workers.
 RESERVED_PERIOD = timedelta(seconds=20)
 
@@ -49,10 +49,12 @@ def find_next_job(session: Session, current_time: datetime, worker: str) -> str 
     """
     # A common table expression; without it SQLite would scan all jobs to count each share.
     recent_jobs = select_recent_jobs(current_time).cte("recent")
-    lane_counts = session.execute(select(recent_jobs.c.lane, func.count()).group_by(recent_jobs.c.lane))
-    jobs_by_lane: dict[JobQueue, int] = dict(lane_counts.all())
-    interactive_jobs, batch_jobs = jobs_by_lane.get(JobQueue.INTERACTIVE, 0), jobs_by_lane.get(JobQueue.BATCH, 0)
-    first_lane = JobQueue.BATCH if interactive_jobs >= (BATCH_EVERY - 1) * (batch_jobs + 1) else JobQueue.INTERACTIVE
+    queue_rows = session.execute(select(recent_jobs.c.lane, func.count()).group_by(recent_jobs.c.lane))
+    job_counts: dict[JobQueue, int] = dict(queue_rows.all())
+    interactive_jobs, batch_jobs = job_counts.get(JobQueue.INTERACTIVE, 0), job_counts.get(JobQueue.BATCH, 0)
+    first_queue = (
+        JobQueue.BATCH if interactive_jobs >= (BATCH_JOB_INTERVAL - 1) * (batch_jobs + 1) else JobQueue.INTERACTIVE
+    )
 
     course_shares = select_shares(recent_jobs.c.course_id)
     batch_shares = select_shares(recent_jobs.c.batch_id)
@@ -63,9 +65,9 @@ def find_next_job(session: Session, current_time: datetime, worker: str) -> str 
         .outerjoin(course_shares, course_shares.c.share == Enrolment.course_id)
         .outerjoin(batch_shares, batch_shares.c.share == Job.batch_id)
         .outerjoin(student_shares, student_shares.c.share == Job.enrolment_id)
-        .where(*match_claimable_jobs(current_time), not_(_match_better_elsewhere(worker, current_time)))
+        .where(*match_claimable_jobs(current_time), not_(_match_reserved_jobs(worker, current_time)))
         .order_by(
-            case((Job.lane == first_lane, 0), else_=1),
+            case((Job.lane == first_queue, 0), else_=1),
             func.coalesce(course_shares.c.begun, 0),
             func.coalesce(batch_shares.c.begun, 0),
             func.coalesce(student_shares.c.begun, 0),
@@ -78,7 +80,7 @@ def find_next_job(session: Session, current_time: datetime, worker: str) -> str 
     return session.scalar(query)
 
 
-def _match_better_elsewhere(worker: str, current_time: datetime) -> ColumnElement[bool]:
+def _match_reserved_jobs(worker: str, current_time: datetime) -> ColumnElement[bool]:
     """Return the condition that a job failed with a host fault on this worker and another worker could try it."""
     # A stopped worker returns its jobs without a fault, and then no error is stored.
     has_failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))

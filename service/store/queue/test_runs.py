@@ -20,9 +20,9 @@ from service.store.web_tables import Tryout
 from sim.errors import UsageError
 
 #: Test runs of one student within an hour.
-MOST_AN_HOUR = 30
+MAX_TEST_RUNS_PER_HOUR = 30
 #: The first death of a worker is retried; a second one is attributed to the program.
-MOST_ATTEMPTS = 2
+MAX_ATTEMPTS = 2
 _RETENTION = timedelta(days=1)
 _SILENT_WORKER = "The worker stopped responding twice. An operator can find details in the log of the worker."
 _UNFINISHED = (RunState.QUEUED.value, RunState.RUNNING.value)
@@ -81,10 +81,10 @@ def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_
     if (
         session.scalar(select(func.count()).where(is_by_student, Tryout.queued_at > current_time - timedelta(hours=1)))
         or 0
-    ) >= (MOST_AN_HOUR):
+    ) >= (MAX_TEST_RUNS_PER_HOUR):
         raise UsageError(
             "%(count)s test runs within an hour is the limit; wait a few minutes, or submit your files.",
-            count=MOST_AN_HOUR,
+            count=MAX_TEST_RUNS_PER_HOUR,
         )
     _delete_programs(session, enrolment_id, version_id)
     row = Tryout(
@@ -114,7 +114,7 @@ def claim_test_run(store: Store, lease_seconds: float) -> ClaimedTestRun | None:
         if needs_newer_code(session):
             return None
         current_time = now(session)
-        abandon_statement = update(Tryout).where(_match_due(current_time), Tryout.attempt >= MOST_ATTEMPTS)
+        abandon_statement = update(Tryout).where(_match_due(current_time), Tryout.attempt >= MAX_ATTEMPTS)
         session.execute(
             abandon_statement.values(state=RunState.FAILED.value, error=_SILENT_WORKER, finished_at=current_time)
         )
@@ -153,7 +153,7 @@ def finish_test_run(store: Store, test_run: ClaimedTestRun, words: dict[str, Any
 def fail_test_run(store: Store, test_run: ClaimedTestRun, sentence: str) -> bool:
     """Handle a host fault: the test run is queued for its second attempt, or has failed."""
     with store.transaction() as session:
-        if test_run.attempt < MOST_ATTEMPTS:
+        if test_run.attempt < MAX_ATTEMPTS:
             return _update_owned(session, test_run, state=RunState.QUEUED.value, lease_until=None, error=sentence)
         result_columns = {"state": RunState.FAILED.value, "finished_at": now(session), "lease_until": None}
         return _update_owned(session, test_run, error=sentence, **result_columns)

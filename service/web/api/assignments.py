@@ -14,7 +14,7 @@ from service.operations.types import Role
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
-from service.web.api_uploads import LARGEST_ASSIGNMENT, ZIP_BODY, UploadedZip
+from service.web.api_uploads import MAX_ASSIGNMENT_BYTES, ZIP_BODY, UploadedZip
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
 from submissions.assignment.assignment_overview import read_overview
@@ -214,7 +214,7 @@ def prepare(access: ManageAccess, context: Context, asked: AssignmentAsked) -> A
 
 
 @router.post("/courses/{course_id}/assignments/uploads", status_code=201, openapi_extra=ZIP_BODY)
-@takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
+@takes_upload(MAX_ASSIGNMENT_BYTES, Role.INSTRUCTOR)
 def upload(
     access: ManageAccess,
     context: Context,

@@ -16,7 +16,7 @@ from service.web.access import RowName
 from service.web.api.shapes import BATCH_EXAMPLE, BatchShape, JobShape, RefusalShape, Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
-from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, UploadedZip
+from service.web.api_uploads import MAX_BATCH_BYTES, ZIP_BODY, UploadedZip
 from service.web.batch_uploads import read_upload
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
@@ -158,7 +158,7 @@ def list_batches(access: ReadAccess, context: Context, limit: Limit = 50, after:
 
 
 @router.post("/courses/{course_id}/batches", status_code=201, openapi_extra=ZIP_BODY)
-@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
+@takes_upload(MAX_BATCH_BYTES, Role.INSTRUCTOR)
 def submit_batch(
     access: SubmitAccess,
     context: Context,

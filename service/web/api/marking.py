@@ -10,8 +10,8 @@ from fastapi import Depends, Path, Query
 from pydantic import BaseModel, Field
 
 from service.operations import appeals, grades
-from service.operations.appeals import LONGEST_TEXT
-from service.operations.grades import LONGEST_COMMENT, LONGEST_REASON, CommentRequest, MarksRequest
+from service.operations.appeals import MAX_TEXT_LENGTH
+from service.operations.grades import MAX_COMMENT_LENGTH, MAX_REASON_LENGTH, CommentRequest, MarksRequest
 from service.operations.types import Role
 from service.web.access import HIGHEST_NUMBER, RowName, RowNumber
 from service.web.api.shapes import Shape, build_example_config
@@ -116,7 +116,7 @@ class MarksAsked(BaseModel):
     """Marks that replace the grader's marks (null excuses the criterion), and a reason that students can read."""
 
     marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
-    reason: str = Field(min_length=1, max_length=LONGEST_REASON, examples=["The last one is named."])
+    reason: str = Field(min_length=1, max_length=MAX_REASON_LENGTH, examples=["The last one is named."])
     seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)
 
 
@@ -124,7 +124,7 @@ class CommentAsked(BaseModel):
     """A comment to the student."""
 
     criterion: str = Field("", max_length=200)
-    text: str = Field(min_length=1, max_length=LONGEST_COMMENT, examples=["Well named!"])
+    text: str = Field(min_length=1, max_length=MAX_COMMENT_LENGTH, examples=["Well named!"])
 
 
 class AppealShape(Shape):
@@ -160,7 +160,7 @@ class AppealShape(Shape):
 class TextAsked(BaseModel):
     """Text of an appeal, or of its answer."""
 
-    text: str = Field(min_length=1, max_length=LONGEST_TEXT, examples=["Please look at the last shape again."])
+    text: str = Field(min_length=1, max_length=MAX_TEXT_LENGTH, examples=["Please look at the last shape again."])
 
 
 @router.get(GRADE_PATH + "/marking")

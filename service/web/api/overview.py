@@ -19,7 +19,7 @@ from service.web.api.regrades import PublishedShape
 from service.web.api.shapes import BATCH_EXAMPLE, RefusalShape, Shape, build_example_config, find_example
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import NO_KEY, api_router
-from service.web.api_uploads import LARGEST_BATCH, ZIP_BODY, UploadedZip
+from service.web.api_uploads import MAX_BATCH_BYTES, ZIP_BODY, UploadedZip
 from service.web.batch_uploads import read_upload
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
@@ -114,7 +114,7 @@ class PublicationShape(Shape):
 
 
 @router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))
-@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
+@takes_upload(MAX_BATCH_BYTES, Role.INSTRUCTOR)
 def look_first(
     access: SubmitAccess,
     context: Context,

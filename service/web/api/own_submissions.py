@@ -35,7 +35,7 @@ from service.web.api_routes import (
     build_list_page,
     decode_cursor,
 )
-from service.web.api_uploads import LARGEST_SUBMISSION, SENT_BODY, SentFiles
+from service.web.api_uploads import MAX_SUBMISSION_BYTES, SENT_BODY, SentFiles
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context
 from service.web.language import detect_language
@@ -210,7 +210,7 @@ def given_file(access: ReadAccess, context: Context, assignment: AssignmentId, f
 
 
 @router.post(PREFIX + "/submissions", status_code=201, openapi_extra=SENT_BODY)
-@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+@takes_upload(MAX_SUBMISSION_BYTES, Role.STUDENT)
 def submit_one(
     access: SubmitAccess,
     context: Context,

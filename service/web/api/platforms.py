@@ -21,7 +21,7 @@ OperatorManageAccess = Annotated[Caller, Depends(require_operator("manage"))]
 ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
 ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 Address = Annotated[str, Field(min_length=1, max_length=1000)]
-RegisteredText = Annotated[str, Field(min_length=1, max_length=platforms.LONGEST_REGISTERED)]
+RegisteredText = Annotated[str, Field(min_length=1, max_length=platforms.MAX_REGISTERED_LENGTH)]
 _PLATFORM_ERRORS: ResponseDescriptions = {
     502: {
         "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}},

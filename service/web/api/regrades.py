@@ -18,7 +18,7 @@ from service.web.access import RowName
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, build_list_page, decode_cursor
-from service.web.api_uploads import LARGEST_TABLE
+from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.request_bodies import takes_upload
@@ -207,7 +207,7 @@ def export(
     response_class=Response,
     openapi_extra=_CSV_BODY,
 )
-@takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
+@takes_upload(MAX_TABLE_BYTES, Role.INSTRUCTOR)
 async def worksheet(
     request: Request, access: ReadAccess, context: Context, batch_id: RowName, published: PublishedOnly = False
 ) -> Response:

@@ -34,7 +34,7 @@ class LinkShape(Shape):
 class LinksAsked(BaseModel):
     """Validity of the links of a course, in days."""
 
-    days: int = Field(sign_in_links.DAYS, ge=1, le=sign_in_links.MOST_DAYS)
+    days: int = Field(sign_in_links.DAYS, ge=1, le=sign_in_links.MAX_DAYS)
 
 
 class StudentLinkShape(Shape):

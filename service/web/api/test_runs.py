@@ -18,7 +18,7 @@ from service.web.api.grades import REPLAY_RESPONSES
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import api_router, respond_with_etag
-from service.web.api_uploads import LARGEST_SUBMISSION, SENT_BODY, SentFiles
+from service.web.api_uploads import MAX_SUBMISSION_BYTES, SENT_BODY, SentFiles
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
 from service.web.student_submissions import start_test_run
@@ -55,7 +55,7 @@ class TryoutShape(Shape):
 
 
 @router.post(PREFIX, status_code=201, openapi_extra=SENT_BODY)
-@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+@takes_upload(MAX_SUBMISSION_BYTES, Role.STUDENT)
 def ask(
     access: SubmitAccess,
     context: Context,

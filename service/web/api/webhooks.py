@@ -55,7 +55,7 @@ class NewWebhookShape(WebhookShape):
 class WebhookAsked(BaseModel):
     """The address and events of a new webhook."""
 
-    url: str = Field(max_length=webhooks.LONGEST_URL, examples=["https://hooks.example.org/robomark"])
+    url: str = Field(max_length=webhooks.MAX_URL_LENGTH, examples=["https://hooks.example.org/robomark"])
     events: list[WebhookEvent] = Field(min_length=1, max_length=20)
 
 

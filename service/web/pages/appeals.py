@@ -9,7 +9,7 @@ from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import appeals
-from service.operations.appeals import LONGEST_TEXT
+from service.operations.appeals import MAX_TEXT_LENGTH
 from service.web.access import CourseInstructor, CourseStudent, RowNumber, RowNumberAfter
 from service.web.context import Context
 from service.web.rendering import render_page
@@ -43,7 +43,7 @@ def show_appeals(
         older=f"{last_appeal.answered_at.isoformat()} {last_appeal.id}"
         if last_appeal is not None and last_appeal.answered_at
         else "",
-        longest=LONGEST_TEXT,
+        longest=MAX_TEXT_LENGTH,
     )
 
 
@@ -68,7 +68,7 @@ def answer_appeal(access: CourseInstructor, context: Context, appeal_id: RowNumb
 def show_own_appeals(request: Request, access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Show a student's appeals about a submission, the answers, and the form if they may appeal."""
     own_appeals = appeals.show_own(context.service, access.actor, access.course_id, submission_id)
-    return render_page(request, access.reader, "appeal.html", here=access, found=own_appeals, longest=LONGEST_TEXT)
+    return render_page(request, access.reader, "appeal.html", here=access, found=own_appeals, longest=MAX_TEXT_LENGTH)
 
 
 @router.post("/mine/submissions/{submission_id}/appeal")

@@ -19,7 +19,7 @@ from service.operations.policies import PolicyLimits
 from service.operations.types import Role
 from service.pending_uploads import clean_file_name
 from service.web.access import CourseInstructor, ReaderInCourse
-from service.web.api_uploads import LARGEST_ASSIGNMENT
+from service.web.api_uploads import MAX_ASSIGNMENT_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.date_times import parse_date_time
@@ -51,7 +51,7 @@ def prepare(access: CourseInstructor, context: Context, assignment: Annotated[st
 
 
 @router.post("/assignments/uploads")
-@takes_upload(LARGEST_ASSIGNMENT, Role.INSTRUCTOR)
+@takes_upload(MAX_ASSIGNMENT_BYTES, Role.INSTRUCTOR)
 def upload(
     request: Request,
     access: CourseInstructor,

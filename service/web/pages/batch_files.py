@@ -14,7 +14,7 @@ from fastapi.responses import Response
 from service.operations.exports import ExportRequest, download
 from service.operations.types import Role
 from service.web.access import CourseInstructor, ReaderInCourse, RowName
-from service.web.api_uploads import LARGEST_TABLE
+from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.request_bodies import takes_upload
@@ -38,7 +38,7 @@ def export(
 
 
 @router.post("/worksheet")
-@takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
+@takes_upload(MAX_TABLE_BYTES, Role.INSTRUCTOR)
 def fill_worksheet(
     access: CourseInstructor,
     context: Context,

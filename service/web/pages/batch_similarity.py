@@ -17,7 +17,7 @@ from service.web.language import detect_language
 from service.web.rendering import render_page
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
-_MOST_SHOWN = 30
+_MAX_LISTED_PAIRS = 30
 
 
 @router.get("/similar")
@@ -33,7 +33,7 @@ def show_similar_submissions(
             for each in compared_batch.lines
         }
         view = build_similarity_view(compared_batch.found, detect_language(request))
-        body = render_similarity_body(view, compared_batch.source, _MOST_SHOWN, links)
+        body = render_similarity_body(view, compared_batch.source, _MAX_LISTED_PAIRS, links)
     submission_count = len(compared_batch.lines)
     return render_page(
         request,

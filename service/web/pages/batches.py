@@ -21,7 +21,7 @@ from service.operations.batches import SubmissionPreview, SubmitRequest
 from service.operations.types import Role
 from service.pending_uploads import ExpectedSubmission, PendingUpload, PendingUploads
 from service.web.access import CourseInstructor, ReaderInCourse, RowName, RowNameAfter
-from service.web.api_uploads import LARGEST_BATCH
+from service.web.api_uploads import MAX_BATCH_BYTES
 from service.web.batch_uploads import read_upload
 from service.web.context import Context, WebContext
 from service.web.rendering import render_page
@@ -47,7 +47,7 @@ def list_batches(request: Request, access: CourseInstructor, context: Context, a
 
 
 @router.post("/uploads")
-@takes_upload(LARGEST_BATCH, Role.INSTRUCTOR)
+@takes_upload(MAX_BATCH_BYTES, Role.INSTRUCTOR)
 def upload(
     request: Request,
     access: CourseInstructor,

@@ -22,9 +22,9 @@ from sim.errors import UsageError
 cross_site_router = APIRouter()
 #: Binds a launch to the browser that started it. The cookie is also sent on the platform's cross-site request.
 _STATE_COOKIE = "robomark_launch"
-_LONGEST = 4000
+_MAX_PARAMETER_LENGTH = 4000
 
-Text = Annotated[str, Form(max_length=_LONGEST)]
+Text = Annotated[str, Form(max_length=_MAX_PARAMETER_LENGTH)]
 
 
 @cross_site_router.get("/lti/keys")
@@ -37,11 +37,11 @@ def list_keys(context: Context) -> dict[str, Any]:
 def login_by_link(
     request: Request,
     context: Context,
-    iss: Annotated[str, Query(max_length=_LONGEST)],
-    login_hint: Annotated[str, Query(max_length=_LONGEST)],
-    target_link_uri: Annotated[str, Query(max_length=_LONGEST)] = "",
-    lti_message_hint: Annotated[str, Query(max_length=_LONGEST)] = "",
-    client_id: Annotated[str, Query(max_length=_LONGEST)] = "",
+    iss: Annotated[str, Query(max_length=_MAX_PARAMETER_LENGTH)],
+    login_hint: Annotated[str, Query(max_length=_MAX_PARAMETER_LENGTH)],
+    target_link_uri: Annotated[str, Query(max_length=_MAX_PARAMETER_LENGTH)] = "",
+    lti_message_hint: Annotated[str, Query(max_length=_MAX_PARAMETER_LENGTH)] = "",
+    client_id: Annotated[str, Query(max_length=_MAX_PARAMETER_LENGTH)] = "",
 ) -> Response:
     """Start a launch from a link."""
     return _begin_launch(request, context, iss, login_hint, target_link_uri, lti_message_hint, client_id)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
 from service.operations import grade_views, grades
-from service.operations.grades import LONGEST_COMMENT, LONGEST_REASON, CommentRequest, MarksRequest
+from service.operations.grades import MAX_COMMENT_LENGTH, MAX_REASON_LENGTH, CommentRequest, MarksRequest
 from service.web.access import HIGHEST_NUMBER, CourseInstructor, ReaderInCourse, RowName, SentRowNumber
 from service.web.context import Context
 from service.web.rendering import render_page
@@ -31,8 +31,8 @@ def show_marking(request: Request, access: CourseInstructor, context: Context, j
         here=access,
         marking=marking,
         beside=grade_views.show_neighbours(context.service, access.actor, access.course_id, job_id),
-        longest_reason=LONGEST_REASON,
-        longest_comment=LONGEST_COMMENT,
+        longest_reason=MAX_REASON_LENGTH,
+        longest_comment=MAX_COMMENT_LENGTH,
     )
 
 

@@ -21,7 +21,7 @@ from service.operations.submissions import MissingPart, SubmissionRequest
 from service.operations.types import Role
 from service.reports.display_text import join_wrapped_lines
 from service.web.access import CourseStudent, ReaderInCourse
-from service.web.api_uploads import LARGEST_SUBMISSION
+from service.web.api_uploads import MAX_SUBMISSION_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.errors import describe_error
@@ -66,7 +66,7 @@ def show_own_assignment(request: Request, access: CourseStudent, context: Contex
 
 
 @router.post("/courses/{course_id}/mine/{assignment}")
-@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+@takes_upload(MAX_SUBMISSION_BYTES, Role.STUDENT)
 def submit_own_files(
     request: Request,
     access: CourseStudent,

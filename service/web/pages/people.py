@@ -21,7 +21,7 @@ from service.operations.types import Role
 from service.pending_uploads import clean_file_name
 from service.reports.formats.csv_output import render_safe_csv
 from service.web.access import CourseInstructor, ReaderInCourse, RowNumber
-from service.web.api_uploads import LARGEST_TABLE
+from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context, WebContext
 from service.web.created_links import LinkWord, build_sign_in_url, derive_secret, find_created_link, generate_word
@@ -34,7 +34,7 @@ from submissions.raw_files import UploadedFile
 from submissions.student_identity import Student, list_known_students, read_people
 
 router = APIRouter(prefix="/courses/{course_id}/people")
-_LONGEST = 200
+_MAX_TEXT_LENGTH = 200
 
 
 @router.get("")
@@ -45,7 +45,7 @@ def list_people(
     q: Annotated[str, Query(max_length=100)] = "",
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
     enrolled: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
-    removed: Annotated[str, Query(max_length=_LONGEST)] = "",
+    removed: Annotated[str, Query(max_length=_MAX_TEXT_LENGTH)] = "",
 ) -> Response:
     """Show everybody in the course, and forms to enrol students."""
     return _render_list(request, access, context, text=q, number=number, enrolled=enrolled, removed=removed)
@@ -56,9 +56,9 @@ def enrol_student(
     request: Request,
     access: CourseInstructor,
     context: Context,
-    who: Annotated[str, Form(min_length=1, max_length=_LONGEST)],
-    name: Annotated[str, Form(max_length=_LONGEST)] = "",
-    email: Annotated[str, Form(max_length=_LONGEST)] = "",
+    who: Annotated[str, Form(min_length=1, max_length=_MAX_TEXT_LENGTH)],
+    name: Annotated[str, Form(max_length=_MAX_TEXT_LENGTH)] = "",
+    email: Annotated[str, Form(max_length=_MAX_TEXT_LENGTH)] = "",
 ) -> Response:
     """Enrol one student. An existing student stays unchanged."""
     try:
@@ -69,7 +69,7 @@ def enrol_student(
 
 
 @router.post("/table")
-@takes_upload(LARGEST_TABLE, Role.INSTRUCTOR)
+@takes_upload(MAX_TABLE_BYTES, Role.INSTRUCTOR)
 def enrol_table(
     request: Request, access: CourseInstructor, context: Context, file: Annotated[UploadFile, File()]
 ) -> Response:
@@ -97,7 +97,7 @@ def create_links(
     request: Request,
     access: CourseInstructor,
     context: Context,
-    days: Annotated[int, Form(ge=1, le=sign_in_links.MOST_DAYS)] = sign_in_links.DAYS,
+    days: Annotated[int, Form(ge=1, le=sign_in_links.MAX_DAYS)] = sign_in_links.DAYS,
 ) -> Response:
     """Return a table with a new sign-in link for each student, to be sent to them."""
     student_links = sign_in_links.make_links(context.service, access.actor, access.course_id, days)
@@ -163,7 +163,9 @@ def create_link(access: CourseInstructor, context: Context, enrolment_id: RowNum
 def remove(access: CourseInstructor, context: Context, enrolment_id: RowNumber) -> Response:
     """Remove a student who has submitted nothing from the course."""
     student_id = people.remove(context.service, access.actor, access.course_id, enrolment_id)
-    return RedirectResponse(f"/courses/{access.course_id}/people?{urlencode({'removed': student_id[:_LONGEST]})}", 303)
+    return RedirectResponse(
+        f"/courses/{access.course_id}/people?{urlencode({'removed': student_id[:_MAX_TEXT_LENGTH]})}", 303
+    )
 
 
 @router.post("/{enrolment_id}/extensions")
@@ -206,5 +208,5 @@ def _render_list(
         enrolled=enrolled,
         removed=removed,
         days=sign_in_links.DAYS,
-        most_days=sign_in_links.MOST_DAYS,
+        most_days=sign_in_links.MAX_DAYS,
     )

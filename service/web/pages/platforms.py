@@ -15,7 +15,7 @@ from service.web.rendering import render_page
 
 router = APIRouter()
 Address = Annotated[str, Form(min_length=1, max_length=1000)]
-RegisteredText = Annotated[str, Form(min_length=1, max_length=operations.LONGEST_REGISTERED)]
+RegisteredText = Annotated[str, Form(min_length=1, max_length=operations.MAX_REGISTERED_LENGTH)]
 
 
 @router.get("/operator/platforms")

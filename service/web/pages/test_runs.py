@@ -13,7 +13,7 @@ from service.operations.errors import NotFound
 from service.operations.types import Role
 from service.reports.html import render_replay_section
 from service.web.access import CourseStudent, ReaderInCourse
-from service.web.api_uploads import LARGEST_SUBMISSION
+from service.web.api_uploads import MAX_SUBMISSION_BYTES
 from service.web.context import Context, WebContext
 from service.web.errors import describe_error
 from service.web.http_errors import extract_message
@@ -44,7 +44,7 @@ def show_newest_test_run(request: Request, access: CourseStudent, context: Conte
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
-@takes_upload(LARGEST_SUBMISSION, Role.STUDENT)
+@takes_upload(MAX_SUBMISSION_BYTES, Role.STUDENT)
 def submit_test_run(
     request: Request, access: CourseStudent, context: Context, assignment: str, files: Files = (), texts: Texts = ()
 ) -> Response:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from brick_link import MOST_UNITS, link, to_plain_number
+from brick_link import MAX_UNITS, link, to_plain_number
 from ev3dev2.speeds import Speed, SpeedValue, round_to_whole
 
 OUTPUT_A = "outA"
@@ -232,7 +232,7 @@ class Motor:
                     "port": self.address,
                     "state": state,
                     # A negative time-out has expired at the first poll, like a time-out of zero.
-                    "timeout": None if timeout is None else round(min(max(timeout * 3000, 0), MOST_UNITS)),
+                    "timeout": None if timeout is None else round(min(max(timeout * 3000, 0), MAX_UNITS)),
                 }
             )
         )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from responders.sandbox.private_folders import PrivateFolders, remove_left_overs
+from responders.sandbox.private_folders import PrivateFolders, remove_stale_folders
 
 _WORKER = """
 import sys
@@ -54,17 +54,17 @@ def test_the_folder_of_a_killed_worker_is_removed_by_the_next(tmp_path: Path) ->
         process.kill()
         process.wait()
         assert trial.exists()
-        remove_left_overs()
+        remove_stale_folders()
         assert list(tmp_path.iterdir()) == []
 
 
 def test_the_folder_of_a_living_worker_is_left_as_it_is(tmp_path: Path) -> None:
     with _worker(tmp_path) as (process, trial):
-        remove_left_overs()
+        remove_stale_folders()
         assert (trial / "weights.joblib").read_bytes() == b"hers"
         process.communicate("")  # it ends by itself and removes only its trial's folder
         assert not trial.exists()
-        remove_left_overs()
+        remove_stale_folders()
         assert list(tmp_path.iterdir()) == []
 
 
@@ -74,7 +74,7 @@ def test_a_worker_whose_process_id_says_nothing_here_keeps_its_folder(tmp_path: 
     if not unshare[0] or subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:
         pytest.skip("no name space of processes can be made here")
     with _worker(tmp_path, *unshare) as (_, trial):
-        remove_left_overs()
+        remove_stale_folders()
         assert (trial / "weights.joblib").exists()
     with _worker(tmp_path) as (_, trial):
         looking = "from responders.sandbox.private_folders import remove_left_overs; remove_left_overs()"
@@ -97,7 +97,7 @@ def test_what_only_looks_like_a_left_over_is_left_alone(tmp_path: Path) -> None:
     if os.getuid() == 0:
         os.chown(anothers, 12345, 12345)
         left.add(anothers.name)
-    remove_left_overs()
+    remove_stale_folders()
     assert {path.name for path in tmp_path.iterdir()} == left
     assert (keep / "file").exists()
 
@@ -108,7 +108,7 @@ def test_a_folder_that_was_tidied_away_is_made_again_and_locked_again(tmp_path: 
     shutil.rmtree(first)
     with folders.one() as trial:
         assert trial.parent == first
-        remove_left_overs()
+        remove_stale_folders()
         assert trial.exists()
         assert first.stat().st_mode & 0o777 == 0o711
         assert trial.stat().st_mode & 0o777 == 0o700

@@ -27,7 +27,7 @@ from service.grading.judging.judge import judge, judge_one
 from service.grading.judging.judge_declaration import StaticAnalysis
 from service.grading.judging.limited_judging import JudgingLimits, compute_judging_limits, judge_within_limits
 from service.grading.trial_runner import TrialRunner
-from service.reports.plots.sequence import MOST_CALL_STEPS, Gap, build_conversation
+from service.reports.plots.sequence import MAX_CALL_STEPS, Gap, build_conversation
 from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Message, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
@@ -423,5 +423,5 @@ def test_a_grade_says_that_staff_have_to_look(
 def test_of_one_message_only_the_first_calls_are_drawn() -> None:
     calls = tuple(Call(0, n % 1000, "responder", "parser", "a", "b") for n in range(10_000))
     told = build_conversation(recorded(messages=(Message(0, "robot", "PY::0", 0),), calls=calls))
-    assert len(told.steps) < MOST_CALL_STEPS + 5
-    assert sum(step.count for step in told.steps if isinstance(step, Gap)) == 20_000 - MOST_CALL_STEPS
+    assert len(told.steps) < MAX_CALL_STEPS + 5
+    assert sum(step.count for step in told.steps if isinstance(step, Gap)) == 20_000 - MAX_CALL_STEPS

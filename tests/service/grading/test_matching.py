@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.grading.judging.matching import match_most_in_order, match_most_pairs
+from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
 
 tables = st.integers(0, 5).flatmap(
     lambda width: st.lists(st.lists(st.booleans(), min_size=width, max_size=width), min_size=1, max_size=5)
@@ -34,7 +34,7 @@ def test_as_many_pairs_as_an_exhaustive_search_finds(table: list[list[bool]]) ->
         taken = [place for place in chosen if place is not None]
         return suited(table, chosen) and len(set(taken)) == len(taken)
 
-    found = match_most_pairs(table)
+    found = match_maximum_pairs(table)
     assert is_pairing(found)
     assert met(found) == max(met(way) for way in ways(len(table), len(table[0])) if is_pairing(way))
 
@@ -48,12 +48,12 @@ def test_as_many_in_order_as_an_exhaustive_search_finds(table: list[list[bool]],
     def first_from(wish: int, start: int) -> int | None:
         return next((place for place in range(start, len(table[wish])) if table[wish][place]), None)
 
-    found = match_most_in_order(len(table), first_from, step)
+    found = match_maximum_in_order(len(table), first_from, step)
     assert is_in_order(found)
     assert met(found) == max(met(way) for way in ways(len(table), len(table[0])) if is_in_order(way))
 
 
 def test_what_comes_first_is_paired_first() -> None:
-    assert match_most_pairs([[True, True], [True, True]]) == [0, 1]
-    assert match_most_pairs([[True, True], [True, False]]) == [1, 0]
-    assert match_most_pairs([[True], [True]]) == [0, None]
+    assert match_maximum_pairs([[True, True], [True, True]]) == [0, 1]
+    assert match_maximum_pairs([[True, True], [True, False]]) == [1, 0]
+    assert match_maximum_pairs([[True], [True]]) == [0, None]

@@ -173,7 +173,7 @@ def _with_a_policy(web: Web) -> dict[str, str]:
 
 def _with_many_webhooks(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
-        for number in range(webhooks.MOST_WEBHOOKS - 1):
+        for number in range(webhooks.MAX_WEBHOOKS - 1):
             webhooks.create_webhook(session, 1, f"https://hooks.example.org/{number}", ["grade.finished"])
     return {}
 

@@ -106,7 +106,7 @@ def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_
     spared = started()
     with spared.busy():
         assert asked == ["asked"]
-    monkeypatch.setattr(known_answers, "_LONGEST_FIRST_DELAY_SECONDS", 0.0)
+    monkeypatch.setattr(known_answers, "_MAX_FIRST_DELAY_SECONDS", 0.0)
     with started().busy():
         assert asked == ["asked"] * 2
 
@@ -134,7 +134,7 @@ def test_one_process_of_a_home_asks_and_the_others_wait_for_its_answer(tmp_path:
 def test_who_waits_for_a_process_that_does_not_answer_asks_in_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(self_test_record, "_LONGEST_WAIT_SECONDS", 0.0)
+    monkeypatch.setattr(self_test_record, "_MAX_WAIT_SECONDS", 0.0)
     first, second = (self_test_record.SelfTestRecord(tmp_path, b"question") for _ in range(2))
     assert first.should_run_here()
     with first.alone(), second.alone():

@@ -13,7 +13,7 @@ from PIL import Image, ImageSequence
 import report_builders as build
 from replays import long_recording
 from service.grading.grade import TrialResult
-from service.reports.film import FRAME_MILLISECONDS, MOST_FRAMES, render_film
+from service.reports.film import FRAME_MILLISECONDS, MAX_FRAMES, render_film
 from service.reports.output_files import write_film
 from sim.errors import UsageError
 from sim.recording import Pose, Recording, Touch
@@ -94,7 +94,7 @@ def test_a_floor_of_the_assignments_own_is_filmed() -> None:
 @pytest.mark.long
 def test_ten_minutes_make_no_more_frames_than_a_minute() -> None:
     data = render_film(trial_of(long_recording(18_000, images=500)), {})
-    assert Image.open(io.BytesIO(data)).n_frames <= MOST_FRAMES  # type: ignore[attr-defined]
+    assert Image.open(io.BytesIO(data)).n_frames <= MAX_FRAMES  # type: ignore[attr-defined]
     assert len(data) < 6_000_000
 
 

@@ -67,7 +67,7 @@ def test_traces_and_json_have_both(relayed: Grade) -> None:
 
 
 def test_the_diagram_has_a_lane_for_each_and_every_text_once(relayed: Grade, crashed: Grade) -> None:
-    told = build_conversation(relayed.trials[0].recording, most_exchanges=50)
+    told = build_conversation(relayed.trials[0].recording, max_exchanges=50)
     assert told.parties == ("robot", "responder", "robot 2")
     arrows = [(step.source, step.target) for step in told.steps if isinstance(step, Step)]
     assert arrows.count(("robot", "responder")) == arrows.count(("responder", "robot")) == 1

@@ -11,7 +11,7 @@ import report_builders
 from responders.source_file import SourceFile
 from service.grading.grade import TrialResult
 from service.similarity.behaviour import (
-    FEWEST_STUDENTS,
+    MIN_STUDENTS,
     SharedBehaviour,
     TrialName,
     extract_behaviour,
@@ -54,7 +54,7 @@ def test_a_path_that_many_drove_says_nothing() -> None:
 
 
 def test_of_few_students_nothing_is_said() -> None:
-    alone = [[driven(31 + number)] for number in range(FEWEST_STUDENTS - 3)]
+    alone = [[driven(31 + number)] for number in range(MIN_STUDENTS - 3)]
     assert same([[driven(30)], [driven(30)], *alone]) == {}
     assert same([[driven(30)], [driven(30)], *alone, [driven(90)]]) != {}
 

@@ -10,7 +10,7 @@ from benchmarks.harness.disguises import DISGUISES
 from service.similarity import similar_sources
 from service.similarity.similar_sources import SimilarSources, Source, SourceComparison, build_source, compare_sources
 from service.similarity.sources import collect_given_code
-from service.similarity.tokens import MOST_TOKENS, tokenise_source
+from service.similarity.tokens import MAX_TOKENS, tokenise_source
 from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 
@@ -142,7 +142,7 @@ def test_names_numbers_texts_and_layout_do_not_count() -> None:
 def test_what_is_no_python_is_compared_too_and_nothing_hangs(text: str) -> None:
     began = time.process_time()
     found = of_two(text, text)
-    assert len(tokenise_source(text)) <= MOST_TOKENS
+    assert len(tokenise_source(text)) <= MAX_TOKENS
     assert all(pair.share == 1 for pair in found.alike)
     assert time.process_time() - began < 20
 
@@ -163,7 +163,7 @@ def test_only_candidates_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(similar_sources, "MOST_PAIRS", 2)
+    monkeypatch.setattr(similar_sources, "MAX_PAIRS", 2)
     half = f"{program(1)}\n{program(2)}"
     sources = [build_source("ada", "robot.py", program(1)), build_source("bob", "robot.py", half)]
     sources += [build_source(str(number), "robot.py", program(number)) for number in range(3, 18)]

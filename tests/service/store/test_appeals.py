@@ -14,7 +14,7 @@ from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import HiddenNames, load_hidden_names
 from service.store.engine import Store
 from service.store.grades import appeals, results
-from service.store.grades.appeals import LONGEST_TEXT
+from service.store.grades.appeals import MAX_TEXT_LENGTH
 from service.store.models import SubmissionRow
 from service.store.queue import jobs
 from sim.errors import UsageError
@@ -74,8 +74,8 @@ def test_what_cannot_be_asked_or_answered_is_refused(store: Store) -> None:
     with pytest.raises(UsageError, match="after your grade is visible"):
         _ask(store)
     _grade(store)
-    for text in ("", " \n ", "x" * (LONGEST_TEXT + 1)):
-        with pytest.raises(UsageError, match=f"expected 1 to {LONGEST_TEXT}"):
+    for text in ("", " \n ", "x" * (MAX_TEXT_LENGTH + 1)):
+        with pytest.raises(UsageError, match=f"expected 1 to {MAX_TEXT_LENGTH}"):
             _ask(store, text)
     number = _ask(store)
     with pytest.raises(UsageError, match="the answer has 0 characters"):

@@ -20,7 +20,7 @@ from service.store import audit
 from service.store.engine import Store
 from service.store.models import Enrolment, Person
 from service.store.people import credentials, membership
-from service.store.people.credentials import MOST_TOKENS
+from service.store.people.credentials import MAX_TOKENS
 from service.store.people.membership import Member
 from service.store.states import CredentialKind, Role
 from submissions.student_identity import Student
@@ -84,10 +84,10 @@ def test_tokens_are_bounded_however_many_are_asked_for_at_once(service: Service)
         return True
 
     with ThreadPoolExecutor(4) as pool:
-        made = list(pool.map(make, range(MOST_TOKENS + 4)))
-    assert made.count(True) == MOST_TOKENS
+        made = list(pool.map(make, range(MAX_TOKENS + 4)))
+    assert made.count(True) == MAX_TOKENS
     listed = own.list_credentials(service, grace)
-    assert len(listed) == MOST_TOKENS
+    assert len(listed) == MAX_TOKENS
     own.end_credential(service, grace, listed[0].id)
     assert make(1000)
 

@@ -115,7 +115,7 @@ def test_marks_keep_their_places(store: Store) -> None:
 
 def test_a_flood_of_images_is_cut_and_the_marks_stay(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.store.grades.recordings.GRADE_BYTES", 1)
-    monkeypatch.setattr("service.store.grades.recordings.SMALLEST_CAP", 1_000)
+    monkeypatch.setattr("service.store.grades.recordings.MIN_RECORDING_BYTES", 1_000)
     grade = report_builders.shape_grade()
     job_id = _stored(store, grade)
     with store.reading() as session:

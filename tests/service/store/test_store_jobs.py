@@ -24,7 +24,7 @@ from service.store.models import Batch, Course, CriterionResultRow, Enrolment, J
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim, LeaseLost, RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, mark_notified, requeue_lost_jobs
-from service.store.queue.scheduling import BATCH_EVERY
+from service.store.queue.scheduling import BATCH_JOB_INTERVAL
 from service.store.states import BatchState, JobQueue, JobState, PlotState
 from submissions.student_identity import RejectedSubmission
 
@@ -222,9 +222,9 @@ def test_batches_share_one_worker(store: Store) -> None:
 
 def test_people_come_before_batches_but_not_for_ever(store: Store) -> None:
     batch = _batch(store, "batch", 3)
-    for number in range(2 * BATCH_EVERY):
+    for number in range(2 * BATCH_JOB_INTERVAL):
         accept_one(store, f"person-{number}")
-    served = _served(store, 2 * BATCH_EVERY)
+    served = _served(store, 2 * BATCH_JOB_INTERVAL)
     assert served[0] is None
     assert served.count(batch) == 2
 
@@ -282,7 +282,7 @@ def test_plots_are_tried_a_few_times(store: Store) -> None:
     job_id = accept_one(store).job_id
     assert plots.claim_plots(store, 60) is None
     _finish(store, _claim(store))
-    for _ in range(plots.MOST_ATTEMPTS):
+    for _ in range(plots.MAX_ATTEMPTS):
         assert plots.claim_plots(store, 60) == job_id
         assert plots.claim_plots(store, 60) is None
         _change(store, job_id, plots_due_at=datetime.now(UTC))

@@ -12,7 +12,7 @@ from service.store.courses.assignment_versions import assignment_from_bytes, fre
 from service.store.engine import Store, now
 from service.store.people.students import Students, ensure_course
 from service.store.queue import test_runs
-from service.store.queue.test_runs import MOST_AN_HOUR, StudentTestRun
+from service.store.queue.test_runs import MAX_TEST_RUNS_PER_HOUR, StudentTestRun
 from service.store.states import RunState
 from service.store.web_tables import Tryout
 from sim.errors import UsageError
@@ -73,11 +73,11 @@ def test_a_student_has_one_at_a_time_and_so_many_an_hour(store: Store) -> None:
     _ask(store, ada)
     with pytest.raises(UsageError, match="is not completed yet"):
         _ask(store, ada)
-    for number in range(MOST_AN_HOUR):
+    for number in range(MAX_TEST_RUNS_PER_HOUR):
         claimed = test_runs.claim_test_run(store, 60)
         assert claimed is not None
         assert test_runs.finish_test_run(store, claimed, {}, None)
-        if number < MOST_AN_HOUR - 1:
+        if number < MAX_TEST_RUNS_PER_HOUR - 1:
             _ask(store, ada)
     with pytest.raises(UsageError, match="within an hour"):
         _ask(store, ada)

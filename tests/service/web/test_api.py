@@ -30,7 +30,7 @@ from service.store.people.credentials import identify
 from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.web.access import build_actor
-from service.web.api_uploads import LARGEST_BATCH
+from service.web.api_uploads import MAX_BATCH_BYTES
 from web import COURSE, Web, submit, web_in
 
 EVERYTHING = ("read", "submit", "mark", "manage")
@@ -159,7 +159,7 @@ def test_lists_come_in_pages_that_miss_and_double_nothing(web: Web, grace: Progr
 
 
 def test_what_is_wrong_is_a_problem(web: Web, grace: Program) -> None:
-    big = {"content-length": str(LARGEST_BATCH + 1), "content-type": "application/zip"}
+    big = {"content-length": str(MAX_BATCH_BYTES + 1), "content-type": "application/zip"}
     answers = {
         404: grace.client.get("/api/v1/nothing"),
         405: grace.client.delete("/api/v1/me", headers=grace.token),

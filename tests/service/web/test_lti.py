@@ -200,7 +200,7 @@ def test_the_oldest_launches_make_room_for_new_ones(
     launched: tuple[Web, LearningPlatform], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     web, platform = launched
-    monkeypatch.setattr(lti, "MOST_PENDING", 3)
+    monkeypatch.setattr(lti, "MAX_PENDING", 3)
     browsers = [_browser(web) for _ in range(5)]
     begun = [_begin(browser) for browser in browsers]
     with web.store.reading() as session:

@@ -20,7 +20,7 @@ from service.operations.scopes import SCOPES
 from service.store.engine import now
 from service.store.models import Enrolment
 from service.store.people import credentials, lti, membership
-from service.store.people.credentials import MOST_SESSIONS, MOST_TOKENS, Reach
+from service.store.people.credentials import MAX_SESSIONS, MAX_TOKENS, Reach
 from service.store.people.lti import Registration
 from service.store.people.membership import Member
 from service.store.people.students import Students
@@ -305,14 +305,14 @@ def _remove(web: Web, member: Member) -> None:
 @pytest.mark.long
 def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> None:
     first = web.browser(ada)
-    browsers = [web.browser(ada) for _ in range(MOST_SESSIONS)]
+    browsers = [web.browser(ada) for _ in range(MAX_SESSIONS)]
     assert first.get("/account").status_code == 303
     assert all(each.get("/account").status_code == 200 for each in browsers)
     browser = browsers[0]
-    for number in range(MOST_TOKENS + 1):
+    for number in range(MAX_TOKENS + 1):
         asked = {"name": "t", "word": f"w{number}", "scopes": ["read"]}
         answer = submit(browser, "/account/tokens", asked)
-        assert answer.status_code == (303 if number < MOST_TOKENS else 409)
+        assert answer.status_code == (303 if number < MAX_TOKENS else 409)
     assert "Revoke a token first" in answer.text
     # The same form again creates nothing new, so it gets the same answer.
     assert submit(browser, "/account/tokens", {"name": "t", "word": "w0", "scopes": ["read"]}).status_code == 303

@@ -17,7 +17,7 @@ from starlette.testclient import TestClient
 from paths import DATA
 from service.store.people.membership import Member
 from service.web import api_routes, request_bodies
-from service.web.request_bodies import LARGEST_FORM
+from service.web.request_bodies import MAX_FORM_BYTES
 from sim.readers.json_text import read_json
 from web import Web, web_in
 from web_world import filled, make_world
@@ -171,9 +171,9 @@ def test_json_is_parsed_in_another_thread_and_within_bounds(
     web, _, members = world
     threads: list[str] = []
 
-    def read(body: bytes, *, most_values: int) -> object:
+    def read(body: bytes, *, max_values: int) -> object:
         threads.append(threading.current_thread().name)
-        return api_real(body, most_values=most_values)
+        return api_real(body, max_values=max_values)
 
     api_real = read_json
     monkeypatch.setattr(api_routes, "read_json", read)
@@ -188,7 +188,7 @@ def test_json_is_parsed_in_another_thread_and_within_bounds(
     assert made.status_code == 201, made.text
     again = {**token, "idempotency-key": "one"}
     assert browser.post(path, headers=again, content=json.dumps([[]] * 30_000), params={}).status_code == 422
-    assert LARGEST_FORM == 2**20
+    assert MAX_FORM_BYTES == 2**20
     assert threads
     assert not any("MainThread" in name or "asyncio" in name for name in threads)
 

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import cookie_parser
 
 from service.settings import Settings, load_settings
-from service.web.api_uploads import LARGEST_BATCH
+from service.web.api_uploads import MAX_BATCH_BYTES
 from service.web.listening_sockets import check_reach
 from service.web.rate_limits import RateLimit
 from service.web.server import build_server_config
@@ -170,7 +170,7 @@ def test_behind_tls_cookies_and_links_are_for_tls(tmp_path: Path) -> None:
         assert answer.headers["strict-transport-security"]
 
 
-@pytest.mark.parametrize(("path", "most"), [("/sign-in", 2**20), ("/courses/1/batches/uploads", LARGEST_BATCH)])
+@pytest.mark.parametrize(("path", "most"), [("/sign-in", 2**20), ("/courses/1/batches/uploads", MAX_BATCH_BYTES)])
 def test_a_body_is_not_read_for_ever(web: Web, path: str, most: int) -> None:
     browser = web.browser(web.instructor())
     for length in (str(most + 1), "-1"):

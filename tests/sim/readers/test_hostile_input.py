@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from sim.readers.csv_text import MOST_LINES_OF_RECORD, read_records, read_rows
+from sim.readers.csv_text import MAX_LINES_OF_RECORD, read_records, read_rows
 from sim.readers.json_text import read_json
 from sim.readers.python_source import parse_module
 from sim.readers.raster_image import read_image
@@ -217,7 +217,7 @@ def test_broken_quotes_cost_the_same_for_each_row(line: str) -> None:
     for count in (500, 4_000):
         lines = _CountedLines(["id,name\n", *[line] * count])
         list(read_records(lines, ","))
-        assert lines.taken <= (MOST_LINES_OF_RECORD + 1) * (count + 1)
+        assert lines.taken <= (MAX_LINES_OF_RECORD + 1) * (count + 1)
 
 
 def test_a_row_with_broken_quotes_costs_itself_alone() -> None:

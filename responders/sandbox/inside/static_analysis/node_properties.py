@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence, Set
 
 from .vocabulary import DOUBTFUL_PARTS, PLAIN_MODULES
 
-_MOST_PARTS = 10
+_MAX_PARTS = 10
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 _EXIT_FUNCTIONS = frozenset({"sys.exit", "os._exit", "os.abort"})
 
@@ -22,7 +22,7 @@ def find_dotted_name(node: ast.AST) -> str:
     For a chain with a call or an index, return the names after the last one.
     """
     parts: list[str] = []
-    while isinstance(node, ast.Attribute) and len(parts) < _MOST_PARTS:
+    while isinstance(node, ast.Attribute) and len(parts) < _MAX_PARTS:
         parts.append(node.attr)
         node = node.value
     if isinstance(node, ast.Name):
@@ -56,7 +56,7 @@ def _is_private(name: str) -> bool:
 
 
 def read_constant_text(node: ast.AST) -> str | None:
-    """Return ``source_of`` as text, with bytes decoded as Latin-1."""
+    """Return the result of ``read_constant`` as text, with bytes decoded as Latin-1."""
     source = read_constant(node)
     return source.decode("latin-1") if isinstance(source, bytes) else source
 

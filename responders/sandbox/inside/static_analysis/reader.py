@@ -23,12 +23,12 @@ from .vocabulary import CONSTRUCTS, PLAIN_MODULES
 
 _IMPORT = "import "
 _CONSTRUCTS = frozenset({*CONSTRUCTS.values(), "else"})
-_LONGEST_TEXT = 300_000
-_LONGEST_TOTAL = 1_000_000
+_MAX_TEXT_LENGTH = 300_000
+_MAX_TOTAL_LENGTH = 1_000_000
 #: Sufficient for all source that the parser accepts.
 _RECURSION_LIMIT = 30_000
-_MOST_DOUBTS = 4
-_LONGEST_NAME = 60
+_MAX_DOUBTS = 4
+_MAX_NAME_LENGTH = 60
 #: Modules of the course that robot programs use but don't import, and that responders don't have.
 _COURSE_MODULES = frozenset({"brick_link", "brick_preambles"})
 
@@ -74,7 +74,7 @@ def read(
         "in_loop": [_find_first_place(foreign_places, rule, {"()": ("looped",)}) for rule in rules["in_loop"]],
         "defines": [_format_place(reachable_places["function"].get(name)) for name in rules["defines"]],
         "shown": [_find_first_place(all_places, rule, _AVOIDED_KINDS) for rule in rules["shown"]],
-        "doubts": _collect_doubts(all_places, rules["avoids"])[:_MOST_DOUBTS] if rules["avoids"] else [],
+        "doubts": _collect_doubts(all_places, rules["avoids"])[:_MAX_DOUBTS] if rules["avoids"] else [],
     }
 
 
@@ -84,7 +84,7 @@ class _SubmissionReader:
     def __init__(self, files: Sequence[Mapping[str, Any]]) -> None:
         self.units: list[CodeUnit] = []
         self.unread: list[Any] | None = None
-        self._left = _LONGEST_TOTAL
+        self._remaining_characters = _MAX_TOTAL_LENGTH
         self.made: set[str] = set()
         self.own = {str(file["name"]).partition(".")[0] for file in files}
         for file in files:
@@ -119,12 +119,12 @@ class _SubmissionReader:
             self._run_walk(name, lambda: walker.read_tree(tree, name, unit))
 
     def _parse_source(self, source: str | bytes, name: str) -> ast.Module | None:
-        self._left -= len(source)
+        self._remaining_characters -= len(source)
         try:
-            if len(source) > _LONGEST_TEXT:
-                self._record_unreadable(name, f"it has more than {_LONGEST_TEXT} characters")
-            elif self._left < 0:
-                self._record_unreadable(name, f"with the others it has more than {_LONGEST_TOTAL} characters")
+            if len(source) > _MAX_TEXT_LENGTH:
+                self._record_unreadable(name, f"it has more than {_MAX_TEXT_LENGTH} characters")
+            elif self._remaining_characters < 0:
+                self._record_unreadable(name, f"with the others it has more than {_MAX_TOTAL_LENGTH} characters")
             else:
                 return ast.parse(source)
         except SyntaxError as error:
@@ -149,7 +149,7 @@ class _SubmissionReader:
 
     def _record_unreadable(self, name: str, reason: str, line: int | None = None) -> None:
         if self.unread is None:
-            self.unread = [name[:_LONGEST_NAME], reason, line]
+            self.unread = [name[:_MAX_NAME_LENGTH], reason, line]
 
     def _describe_doubt(self, module: str) -> str:
         top = module.partition(".")[0]
@@ -289,7 +289,9 @@ def _collect_doubts(places: Places, rules: Sequence[str]) -> list[list[Any]]:
     for rule in rules:
         for description, place in _list_look_alikes(places, rule):
             doubts.setdefault(place, description)
-    return [[place.file[:_LONGEST_NAME], place.line, what[:_LONGEST_NAME]] for place, what in sorted(doubts.items())]
+    return [
+        [place.file[:_MAX_NAME_LENGTH], place.line, what[:_MAX_NAME_LENGTH]] for place, what in sorted(doubts.items())
+    ]
 
 
 def _list_look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePlace]]:
@@ -306,4 +308,4 @@ def _list_look_alikes(places: Places, rule: str) -> Iterable[tuple[str, SourcePl
 
 
 def _format_place(place: SourcePlace | None) -> PlaceRow:
-    return None if place is None else [place.file[:_LONGEST_NAME], place.line]
+    return None if place is None else [place.file[:_MAX_NAME_LENGTH], place.line]

@@ -15,17 +15,17 @@ from .lookups import is_text_expression
 from .node_properties import collect_bound_names, find_dotted_name, find_root_name
 from .vocabulary import TABLE_CALLS
 
-_MOST_NAMES = 8
+_MAX_NAMES = 8
 
 
 @dataclass(slots=True)
 class _Scope:
-    """A scope: names ``bound`` anywhere in it, ``so_far`` before the current place, ``sure`` on every path to it."""
+    """A scope and its names: all, those bound before the current place, and those bound on every path to it."""
 
     kind: str  # module, class, function, comprehension
     bound: set[str] = field(default_factory=set)
-    so_far: set[str] = field(default_factory=set)
-    sure: set[str] = field(default_factory=set)
+    bound_so_far: set[str] = field(default_factory=set)
+    always_bound: set[str] = field(default_factory=set)
 
 
 class SymbolTable:
@@ -33,7 +33,7 @@ class SymbolTable:
 
     def __init__(self) -> None:
         self._scopes = [_Scope("module")]
-        self._stands_for: dict[str, set[str]] = {}
+        self._aliases: dict[str, set[str]] = {}
         self._imported: set[str] = set()
         self._functions: set[str] = set()
         self._texts: set[str] = set()
@@ -72,9 +72,9 @@ class SymbolTable:
         """Return the dotted name of a chain, followed by its names with the first part replaced by known aliases."""
         names = [find_dotted_name(node)]
         pending_names = list(names) if find_root_name(node) else []
-        while pending_names and len(names) < _MOST_NAMES:
+        while pending_names and len(names) < _MAX_NAMES:
             root, dot, rest = pending_names.pop().partition(".")
-            for target in sorted(self._stands_for.get(root, ())):
+            for target in sorted(self._aliases.get(root, ())):
                 full_name = f"{target}{dot}{rest}"
                 if full_name not in names:
                     names.append(full_name)
@@ -113,16 +113,16 @@ class SymbolTable:
         is_later = False
         for scope in reversed(self._scopes[1:]):
             if scope.kind == "class":
-                if scope is self._scopes[-1] and name in scope.so_far:
-                    return True if name in scope.sure else None
+                if scope is self._scopes[-1] and name in scope.bound_so_far:
+                    return True if name in scope.always_bound else None
                 continue
             if name in scope.bound:
                 return True
             is_later = is_later or scope.kind == "function"
         module = self._scopes[0]
-        if name in module.sure and name not in self._unsure:
+        if name in module.always_bound and name not in self._unsure:
             return True
-        is_unsure = name in module.so_far or (is_later and (name in module.bound or name in self._unsure))
+        is_unsure = name in module.bound_so_far or (is_later and (name in module.bound or name in self._unsure))
         return None if is_unsure else False
 
     @contextlib.contextmanager
@@ -136,19 +136,19 @@ class SymbolTable:
     def block(self) -> Iterator[None]:
         """Enter code that may not run. The names that it binds are not sure after it."""
         scope = self._scopes[-1]
-        sure_names = set(scope.sure)
+        sure_names = set(scope.always_bound)
         yield
-        scope.sure = sure_names
+        scope.always_bound = sure_names
 
     def bind(self, names: set[str], *, is_sure: bool = True) -> None:
         """Mark these names as bound from here on, or possibly bound."""
         scope = self._scopes[-1]
-        scope.so_far |= names
+        scope.bound_so_far |= names
         if is_sure:
-            scope.sure |= names
+            scope.always_bound |= names
 
     def _record_alias(self, name: str, target: str, *, is_imported: bool = False) -> None:
-        self._stands_for.setdefault(name, set()).add(target)
+        self._aliases.setdefault(name, set()).add(target)
         if is_imported:
             self._imported.add(name)
 

@@ -44,7 +44,7 @@ from .vocabulary import (
 
 _MAX_TEXT_DEPTH = 8
 #: Maximum number of places kept per mention.
-_MOST_PLACES = 200
+_MAX_PLACES = 200
 
 
 class _Context(NamedTuple):
@@ -94,7 +94,7 @@ class SyntaxWalker:
         if name:
             place = SourcePlace(self._file, getattr(node, "lineno", 0), statement or self._statement)
             places = self._unit.mentions.setdefault(Mention(kind, name, context.live, context.looped), [])
-            if len(places) < _MOST_PLACES:
+            if len(places) < _MAX_PLACES:
                 places.append(place)
 
     def _add_text_name(self, text: str, node: ast.AST, context: _Context) -> None:
