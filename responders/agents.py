@@ -241,7 +241,7 @@ class AgentProcess(ResponderProcess):
     ) -> None:
         super().__init__(spec, sandboxes, folder, seed, meter, agents)
         self._schema = wire.AGENT
-        self._name = name
+        self._who = name
         self._all = agents
         self._ended: AgentReply | None = None
         self.given = spec.given
@@ -250,7 +250,7 @@ class AgentProcess(ResponderProcess):
     def answer_question(self, question: wire.Frame, t: int, message: int) -> AgentReply:
         """Return the agent's reply to a question. Raises no exception for errors in student code."""
         if self._child is None:
-            return self._ended or AgentReply("error", f"{self._name} gave no answer: it could not be loaded")
+            return self._ended or AgentReply("error", f"{self._who} gave no answer: it could not be loaded")
         self._message, self._asked_at, self._slept = message, t, 0
         try:
             self._child.send({"do": "asked", "t": t, "arguments": question["arguments"], "named": question["named"]})
@@ -260,16 +260,16 @@ class AgentProcess(ResponderProcess):
         except Exception as error:
             stop = to_child_data_error(error)
         fault = self._convert_stop(stop, t + self._slept)
-        reply = self._all.record_failure(self._name, fault, stop.message, self._slept)
+        reply = self._all.record_failure(self._who, fault, stop.message, self._slept)
         self._ended = replace(reply, slept=0)
         return reply
 
     def _build_first_frame(self) -> dict[str, Any]:
-        seed = RandomStream(self._seed, f"agent {self._name}").integer(0)
+        seed = RandomStream(self._seed, f"agent {self._who}").integer(0)
         return {
             **super()._build_first_frame(),
-            "agent": self._name,
-            "agents": self._all.list_askable_agents(self._name),
+            "agent": self._who,
+            "agents": self._all.list_askable_agents(self._who),
             "seed": seed,
         }
 
@@ -279,19 +279,19 @@ class AgentProcess(ResponderProcess):
                 _parse_content(text, object)
                 return AgentReply("value", text, self._slept)
             case {"kind": "error", "error": error}:
-                fault = build_error_fault(error, self._asked_at + self._slept, self._name)
+                fault = build_error_fault(error, self._asked_at + self._slept, self._who)
                 # A RuntimeError reports the fault of another agent. Only the original cause is passed on.
                 reason = str(error["text"] or fault.message) if error["type"] == "RuntimeError" else fault.message
-                return self._all.record_failure(self._name, fault, reason, self._slept)
+                return self._all.record_failure(self._who, fault, reason, self._slept)
             case {"kind": "other", "type": kind}:
-                sentence = f"the {self._name} returned {kind[:_MAX_TYPE_LENGTH]}, which no message can hold"
+                sentence = f"the {self._who} returned {kind[:_MAX_TYPE_LENGTH]}, which no message can hold"
                 fault = self._build_protocol_fault(self._asked_at, sentence)
             case {"kind": "long", "length": length}:
-                sentence = f"the {self._name} returned {length} characters of JSON; the most is about 60000"
+                sentence = f"the {self._who} returned {length} characters of JSON; the most is about 60000"
                 fault = self._build_protocol_fault(self._asked_at, sentence)
             case _:
                 raise ChildStopped(Verdict.SANDBOX_VIOLATION, "it sent an answer without its content")
-        return self._all.record_failure(self._name, fault, sentence, self._slept)
+        return self._all.record_failure(self._who, fault, sentence, self._slept)
 
 
 def _parse_content(text: str, kind: type) -> Any:

@@ -77,7 +77,7 @@ def test_a_worker_whose_process_id_says_nothing_here_keeps_its_folder(tmp_path: 
         remove_stale_folders()
         assert (trial / "weights.joblib").exists()
     with _worker(tmp_path) as (_, trial):
-        looking = "from responders.sandbox.private_folders import remove_left_overs; remove_left_overs()"
+        looking = "from responders.sandbox.private_folders import remove_stale_folders; remove_stale_folders()"
         subprocess.run(
             [*unshare, sys.executable, "-c", looking], env=os.environ | {"TMPDIR": str(tmp_path)}, check=True
         )
