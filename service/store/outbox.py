@@ -126,10 +126,10 @@ def claim_deliveries(store: Store, limit: int) -> list[ClaimedDelivery]:
         # Another process may have claimed a delivery of a webhook before it was locked here.
         busy_webhooks = _load_busy_webhooks(session, current_time)
         return [
-            claimed_deliveries
+            delivery
             for hook in hooks
             if hook.id not in busy_webhooks
-            and (claimed_deliveries := _claim_oldest_delivery(session, hook, current_time)) is not None
+            and (delivery := _claim_oldest_delivery(session, hook, current_time)) is not None
         ]
 
 

@@ -33,12 +33,12 @@ from submissions.student_names import normalise_name
 
 _TEMPORARY = MetaData()
 #: Ids of submissions and enrolments to remove; there may be more than a statement accepts as parameters.
-_GOING = Table("going", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
-_LEAVING = Table("leaving", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
+_MARKED_SUBMISSIONS = Table("going", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
+_MARKED_ENROLMENTS = Table("leaving", _TEMPORARY, Column("id", Integer, primary_key=True), prefixes=["TEMPORARY"])
 _CHUNK_SIZE = 500
 _ERASED = "erased"
-_going = select(_GOING.c.id)
-_leaving = select(_LEAVING.c.id)
+_marked_submission_ids = select(_MARKED_SUBMISSIONS.c.id)
+_marked_enrolment_ids = select(_MARKED_ENROLMENTS.c.id)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,8 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCount
         )
     _TEMPORARY.create_all(session.connection())
     own_submissions = select(SubmissionRow.id).where(SubmissionRow.enrolment_id == enrolment_id)
-    session.execute(insert(_GOING).from_select(["id"], own_submissions))
-    session.execute(insert(_LEAVING).values(id=enrolment_id))
+    session.execute(insert(_MARKED_SUBMISSIONS).from_select(["id"], own_submissions))
+    session.execute(insert(_MARKED_ENROLMENTS).values(id=enrolment_id))
     counts = _count_marked_rows(session)
     _erase_names(session, enrolment)
     _delete_replies(session, enrolment.course_id)
@@ -120,8 +120,10 @@ def erase_student(session: Session, enrolment_id: int, actor: str) -> PurgeCount
 
 
 def _count_marked_rows(session: Session) -> PurgeCounts:
-    grades = select(func.count()).select_from(Job).where(Job.submission_id.in_(_going))
-    return PurgeCounts(_count_rows(session, _GOING), session.scalar(grades) or 0, _count_rows(session, _LEAVING))
+    grades = select(func.count()).select_from(Job).where(Job.submission_id.in_(_marked_submission_ids))
+    return PurgeCounts(
+        _count_rows(session, _MARKED_SUBMISSIONS), session.scalar(grades) or 0, _count_rows(session, _MARKED_ENROLMENTS)
+    )
 
 
 def _erase_names(session: Session, enrolment: Enrolment) -> None:
@@ -159,34 +161,34 @@ def _mark_old_submissions(session: Session, cutoff: datetime, course_id: int | N
     if course_id is not None:
         course_enrolments = select(Enrolment.id).where(Enrolment.course_id == course_id)
         old_submissions = old_submissions.where(SubmissionRow.enrolment_id.in_(course_enrolments))
-    session.execute(insert(_GOING).from_select(["id"], old_submissions))
+    session.execute(insert(_MARKED_SUBMISSIONS).from_select(["id"], old_submissions))
     source = aliased(Job)
     needed_ids = (
         select(source.submission_id)
         .join(Job, or_(Job.copied_from == source.id, Job.regrade_of == source.id))
-        .where(Job.submission_id.not_in(_going))
+        .where(Job.submission_id.not_in(_marked_submission_ids))
     )
     # The source of a kept copy may be a copy itself.
-    while session.execute(delete(_GOING).where(_GOING.c.id.in_(needed_ids))).rowcount:  # type: ignore[attr-defined]
+    while session.execute(delete(_MARKED_SUBMISSIONS).where(_MARKED_SUBMISSIONS.c.id.in_(needed_ids))).rowcount:  # type: ignore[attr-defined]
         pass
-    losing_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_going))
-    keeping_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_going))
-    session.execute(insert(_LEAVING).from_select(["id"], losing_enrolments.except_(keeping_enrolments)))
+    losing_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_marked_submission_ids))
+    keeping_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_marked_submission_ids))
+    session.execute(insert(_MARKED_ENROLMENTS).from_select(["id"], losing_enrolments.except_(keeping_enrolments)))
 
 
 def _delete_marked(session: Session) -> None:
-    is_marked = Job.submission_id.in_(_going)
+    is_marked = Job.submission_id.in_(_marked_submission_ids)
     marked_jobs = select(Job.id).where(is_marked)
     is_marked_or_copy = or_(is_marked, Job.copied_from.in_(marked_jobs))
-    lock_submissions(session, SubmissionRow.id.in_(_going))
+    lock_submissions(session, SubmissionRow.id.in_(_marked_submission_ids))
     lock_jobs(session, is_marked_or_copy)
     session.execute(update(Job).where(is_marked_or_copy).values(copied_from=None))
     session.execute(update(Job).where(is_marked).values(regrade_of=None))
     # Deleting a job also deletes its trials, results and artifacts.
     session.execute(delete(Job).where(is_marked))
     for column in (Override.submission_id, Comment.submission_id, Appeal.submission_id):
-        session.execute(delete(column.class_).where(column.in_(_going)))
-    session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(_going)))
+        session.execute(delete(column.class_).where(column.in_(_marked_submission_ids)))
+    session.execute(delete(SubmissionRow).where(SubmissionRow.id.in_(_marked_submission_ids)))
     is_used_batch = (
         Batch.id.in_(select(Job.batch_id).where(Job.batch_id.is_not(None))),
         Batch.id.in_(select(SubmissionRow.batch_id).where(SubmissionRow.batch_id.is_not(None))),
@@ -196,13 +198,13 @@ def _delete_marked(session: Session) -> None:
     session.execute(delete(Batch).where(~or_(*is_used_batch), Batch.regrade_of.is_not(None)))
     regraded_batches = select(Batch.regrade_of).where(Batch.regrade_of.is_not(None))
     session.execute(delete(Batch).where(~or_(*is_used_batch), Batch.id.not_in(regraded_batches)))
-    person_ids = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_leaving))))
+    person_ids = list(session.scalars(select(Enrolment.person_id).where(Enrolment.id.in_(_marked_enrolment_ids))))
     for column in (Extension.enrolment_id, Tryout.enrolment_id):
-        session.execute(delete(column.class_).where(column.in_(_leaving)))
+        session.execute(delete(column.class_).where(column.in_(_marked_enrolment_ids)))
     version_queries = [select(table.assignment_version_id) for table in (Job, OpenAssignment, Tryout)]
     session.execute(delete(AssignmentVersion).where(*(AssignmentVersion.id.not_in(each) for each in version_queries)))
-    _sign_out_leaving(session)
-    session.execute(delete(Enrolment).where(Enrolment.id.in_(_leaving)))
+    _sign_out_marked(session)
+    session.execute(delete(Enrolment).where(Enrolment.id.in_(_marked_enrolment_ids)))
     enrolled_ids = select(Enrolment.person_id)
     for start in range(0, len(person_ids), _CHUNK_SIZE):
         is_unenrolled = (
@@ -218,11 +220,11 @@ def _delete_marked(session: Session) -> None:
         session.execute(delete(Person).where(*is_unenrolled))
 
 
-def _sign_out_leaving(session: Session) -> None:
+def _sign_out_marked(session: Session) -> None:
     """Revoke the credentials of students who leave a course, if they reach that course."""
     has_reach = or_(Credential.course_id.is_(None), Credential.course_id == Enrolment.course_id)
     leaving_enrolments = select(Enrolment.id).where(
-        Enrolment.id.in_(_leaving), Enrolment.person_id == Credential.person_id, has_reach
+        Enrolment.id.in_(_marked_enrolment_ids), Enrolment.person_id == Credential.person_id, has_reach
     )
     statement = (
         update(Credential)

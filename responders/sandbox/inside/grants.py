@@ -46,7 +46,7 @@ _SYSTEM_PATHS = (
 
 
 def list_readable_paths(roots: list[str], closed_paths: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the readable files and folders, except all that is ``closed_paths``, even inside one of them."""
+    """Return the readable files and folders, except ``closed_paths``, even inside one of them."""
     granted_paths = {*roots, *_list_standard_library(), *_list_packages(), *_list_system_libraries(), *_SYSTEM_PATHS}
     return tuple(
         {
