@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 
 from responders.message_format import JSON
+from service.grading.fault_kinds import FaultKind, read_values
 from service.grading.grade import CriterionResult
 from service.grading.hint_clues import Clues, describe_first_failure
 from service.grading.hint_code import join_tokens
@@ -25,7 +26,6 @@ from submissions.criteria.reporting import Reports
 from submissions.criteria.unreliable_channel import FreshAnswers, Resends
 
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
-_NO_KEY = re.compile(r"KeyError: '([^']+)'")
 _AFTER = re.compile(r'"([^"]+)" did not come after "(\w+)"')
 _NONE_VALUE = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
@@ -53,8 +53,8 @@ def hint_about_other_keys(clues: Clues) -> Iterator[str]:
 
 def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key that the assignment asks for and the robot reads, but no answer has."""
-    matches = (_NO_KEY.match(fault.message) for fault in clues.faults if fault.who == "program")
-    key = next((found[1] for found in matches if found), "")
+    program_faults = (fault for fault in clues.faults if fault.who == "program")
+    key = next((values[0] for fault in program_faults if (values := read_values(fault, FaultKind.NO_KEY))), "")
     if not key or f'"{key}"' not in clues.task or clues.missing == "responder":
         return
     answer_keys = list(dict.fromkeys(each for answer in clues.answers for each in _KEY.findall(answer)))

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
 
+from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
 from service.grading.hint_motion import describe_skipped_loops
 from service.grading.hint_names import (
     PRELOADED,
-    UNDEFINED_NAME,
     advise_on_constant,
     advise_on_later_cell,
     advise_on_later_line,
@@ -35,14 +35,7 @@ from submissions.raw_files import sanitise_name
 
 _NON_ERROR_VERDICTS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
 _MAX_ERRORS, _MAX_ERROR_LENGTH = 3, 300
-_NO_FILE = re.compile(r"FileNotFoundError: \[Errno 2\] No such file or directory: '([^']+)'")
-_NO_ACCESS = re.compile(r"^PermissionError|Permission denied|may only open files")
-_NO_KEY = re.compile(r"KeyError: '([^']+)'")
 _NULL = re.compile(r"^JSON::.*\bnull\b")
-_NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
-_TOO_FEW = re.compile(r"TypeError: (?:\w+\.)*(\w+)\(\) (?:missing|takes)")
-_NO_MODULE = re.compile(r"ModuleNotFoundError: No module named '([\w.]+)'")
-_UNPACKED = re.compile(r"ValueError: (?:too many|not enough) values to unpack")
 _LIBRARIES = ("joblib", "numpy", "pandas", "sklearn")
 _LABELS = re.compile(r"label|target|\by\b|y_train", re.IGNORECASE)
 #: Reasons why a message was lost for good. Waiting does not help.
@@ -91,10 +84,10 @@ def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
     location = describe_fault_line(fault, clues)
     if not location:
         return
-    name = UNDEFINED_NAME.match(fault.message)
-    if name and fault.who == "program" and clues.preamble != "preloaded" and name[1] in PRELOADED:
+    values = read_values(fault, FaultKind.UNDEFINED_NAME)
+    if values and fault.who == "program" and clues.preamble != "preloaded" and values[0] in PRELOADED:
         yield (
-            f"{location} uses {name[1]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
+            f"{location} uses {values[0]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
             "or the name to be defined"
         )
         return
@@ -125,7 +118,7 @@ def advise_on_error(fault: Fault, clues: Clues) -> str:
 def _advise_on_null(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an error caused by a null value from the responder."""
     answer = next((text for text in clues.answers if _NULL.search(text)), None)
-    if fault.who != "program" or "'NoneType' object" not in fault.message or answer is None:
+    if fault.who != "program" or not is_kind(fault, FaultKind.NONE_OBJECT) or answer is None:
         return ""
     location = describe_return_line(answer, clues, RETURN_LINE)
     return f"The responder answered {quote_text(answer)}: check why {location} is reached, and its condition."
@@ -134,7 +127,7 @@ def _advise_on_null(fault: Fault, clues: Clues, *_: object) -> str:
 def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
     """Return advice on an answer that never came because the channel lost the message."""
     is_queue_empty = (
-        "IndexError" in fault.message and statement is not None and statement.has_token("pyState", "messages")
+        is_kind(fault, FaultKind.INDEX_ERROR) and statement is not None and statement.has_token("pyState", "messages")
     )
     lost_message = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
     if fault.who != "program" or not is_queue_empty or lost_message is None or clues.answers:
@@ -146,10 +139,10 @@ def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, state
 
 def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an import of an agent, of a robot-only module, or of an unavailable module."""
-    match = _NO_MODULE.match(fault.message)
-    if match is None:
+    values = read_values(fault, FaultKind.NO_MODULE)
+    if values is None:
         return ""
-    name = match[1].partition(".")[0]
+    name = values[0].partition(".")[0]
     if name in clues.agents:
         return f"{name}.py is an agent, and agents are not imported: delete this line and call {name}(...)."
     if name.startswith("ev3dev2") and fault.who == "responder":
@@ -164,7 +157,7 @@ def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, sta
     """Return advice on a message that the responder uses as an object without decoding it."""
     if fault.who != "responder" or listing is None or statement is None:
         return ""
-    if not fault.message.startswith("TypeError: string indices") or any(
+    if not is_kind(fault, FaultKind.TEXT_INDEX) or any(
         each.has_token("loads", "literal_eval") for each in listing.code.statements
     ):
         return ""
@@ -173,7 +166,7 @@ def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, sta
 
 def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a property with three values that is unpacked into fewer names."""
-    if statement is None or not _UNPACKED.match(fault.message) or "=" not in statement.tokens:
+    if statement is None or not is_kind(fault, FaultKind.WRONG_UNPACKING) or "=" not in statement.tokens:
         return ""
     equals_index = statement.tokens.index("=")
     value = statement.tokens[-1]
@@ -185,7 +178,7 @@ def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: 
 
 def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on ``fit`` called with labels and images in the wrong order."""
-    if statement is None or "could not convert string to float" not in fault.message:
+    if statement is None or not is_kind(fault, FaultKind.NO_NUMBER):
         return ""
     for call in statement.calls:
         arguments = [join_tokens(each) for each in call.arguments if "=" not in each]
@@ -201,17 +194,17 @@ def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statem
 
 def _advise_on_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a speed given in the position of the steering."""
-    calls = () if statement is None or "SpeedPercent" not in fault.message else statement.calls
+    calls = () if statement is None or not is_kind(fault, FaultKind.NO_SPEED) else statement.calls
     usage = next((USAGE[call.name] for call in calls if call.name.startswith("tank_turn.") and call.name in USAGE), "")
     return f"The arguments are in the wrong order: write {usage}." if usage else ""
 
 
 def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a file that was not submitted, or is named with a folder."""
-    match = _NO_FILE.search(fault.message)
-    if match:
-        file = PurePosixPath(match[1].replace("\\", "/")).name
-        if file in clues.files or file != match[1]:
+    values = read_values(fault, FaultKind.NO_FILE)
+    if values:
+        file = PurePosixPath(values[0].replace("\\", "/")).name
+        if file in clues.files or file != values[0]:
             return (
                 f"Files lie beside your program: submit {sanitise_name(file)} with it and write "
                 f'"{sanitise_name(file)}", no folder.'
@@ -219,7 +212,7 @@ def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None,
         if fault.hint:
             return f"{fault.hint} Submit {sanitise_name(file)} with your program if that is the right name."
         return f"There is no such file. Submit {sanitise_name(file)} with your program."
-    if not _NO_ACCESS.search(fault.message) or listing is None or fault.line is None:
+    if not is_kind(fault, FaultKind.NO_ACCESS) or listing is None or fault.line is None:
         return ""
     for text in _TEXT.finditer("".join(listing.lines[fault.line - 1 : fault.line])):
         if "/" in text[2] or "\\" in text[2]:
@@ -230,12 +223,13 @@ def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None,
 
 def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on a key that is similar to one in the messages or the submission."""
-    match = _NO_KEY.match(fault.message)
-    if not match:
+    values = read_values(fault, FaultKind.NO_KEY)
+    if not values:
         return ""
+    (missing_key,) = values
     texts = (*clues.answers, *clues.sent, *(line for each in clues.listings for line in each.lines))
-    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != match[1]))[:200]
-    similar_keys = difflib.get_close_matches(match[1], keys, 1, _NEAR_KEY)
+    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != missing_key))[:200]
+    similar_keys = difflib.get_close_matches(missing_key, keys, 1, _NEAR_KEY)
     if similar_keys:
         return f'Did you mean "{similar_keys[0]}"?'
     answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
@@ -246,8 +240,7 @@ def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
 
 def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a call of something that is not callable: a property, or an overwritten name."""
-    match = _NOT_CALLABLE.match(fault.message)
-    if match is None or statement is None or listing is None:
+    if not is_kind(fault, FaultKind.NOT_CALLABLE) or statement is None or listing is None:
         return ""
     for call in statement.calls:
         name = call.name.rpartition(".")[2]
@@ -264,10 +257,10 @@ def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, stateme
 
 def _advise_on_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return the usage of a call that has too few values."""
-    match = _TOO_FEW.match(fault.message)
-    if match is None or statement is None:
+    values = read_values(fault, FaultKind.WRONG_ARGUMENTS)
+    if values is None or statement is None:
         return ""
-    call = next((each for each in statement.calls if each.name.rpartition(".")[2] == match[1]), None)
+    call = next((each for each in statement.calls if each.name.rpartition(".")[2] == values[1]), None)
     usage = USAGE.get(call.name) if call is not None else None
     return f"Write {usage}." if usage else ""
 

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 
 from responders.message_format import IMG_DATA, JSON, PY, classify_text
+from service.grading.fault_kinds import FaultKind, is_kind
 from service.grading.hint_clues import Clues, Listing, name_faulty_text
 from service.grading.judging.message_parts import quote_text
 from submissions.file_kinds import find_similar_file
@@ -56,7 +57,7 @@ def hint_about_empty_parts(clues: Clues) -> Iterator[str]:
 
 def hint_about_magics(clues: Clues) -> Iterator[str]:
     """Yield a hint on a magic line that is below other code, lacks its %, or is valid only in a notebook."""
-    syntax_faults = [fault for fault in clues.faults if fault.message.startswith(("SyntaxError", "NameError"))]
+    syntax_faults = [each for each in clues.faults if is_kind(each, FaultKind.SYNTAX_ERROR, FaultKind.NAME_ERROR)]
     for listing in clues.listings:
         if listing.part is None:
             continue

@@ -9,6 +9,7 @@ import difflib
 import re
 from collections.abc import Iterator
 
+from service.grading.fault_kinds import FaultKind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, guess_result_name, join_tokens
 from service.grading.hint_differences import advise_on_difference, parse_value
@@ -18,7 +19,6 @@ from submissions.criteria.code import Functions
 from submissions.raw_files import sanitise_name
 
 _RETURNED_NOTHING = re.compile(r"returned (?:null|None|NoneType)")
-_GAVE_NOTHING = re.compile(r"TypeError: (\w+) returned NoneType, which has no \w+")
 _NO_FUNCTION = "there is no function called"
 _HIDDEN_CALLS = "hidden calls"
 _CALL = re.compile(r"Expected (\w+)\(")
@@ -122,7 +122,8 @@ def describe_missing_return(listing: Listing, head: Statement) -> str:
 
 def hint_about_missing_return(clues: Clues) -> Iterator[str]:
     """Yield a hint on a function such as ``train`` that ends without a return."""
-    name = next((found[1] for fault in clues.faults if (found := _GAVE_NOTHING.search(fault.message))), "")
+    fault_values = (read_values(fault, FaultKind.NO_RETURN) for fault in clues.faults)
+    name = next((values[0] for values in fault_values if values), "")
     for listing in clues.responders:
         for head in listing.code.list_functions():
             has_return = any(each.keyword == "return" for each in listing.code.list_body(head))

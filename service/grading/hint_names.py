@@ -8,13 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, join_tokens
 from sim.recording import Fault
 
-UNDEFINED_NAME = re.compile(r"NameError: name '(\w+)' is not defined")
-_NO_ATTRIBUTE = re.compile(r"AttributeError: '(\w+)' object has no attribute '(\w+)'")
-_NOT_CALLABLE = re.compile(r"TypeError: '(\w+)' object is not callable")
 _CALL = re.compile(r"(?<![.\w])(\w+)\(")
 #: Python's form of constants from JSON and other languages.
 _CONSTANTS = {"null": "None", "none": "None", "NULL": "None", "true": "True", "false": "False"}
@@ -48,32 +46,32 @@ _OWNERS = {
 
 def advise_on_owner(fault: Fault, clues: Clues, *_: object) -> str:
     """Return advice on an attribute of a robot part that is written without its object."""
-    name = UNDEFINED_NAME.match(fault.message)
-    owners = _OWNERS.get(name[1], ()) if name and fault.who == "program" and clues.preamble == "preloaded" else ()
-    if name is None or not owners:
+    name = _find_undefined_name(fault)
+    owners = _OWNERS.get(name, ()) if fault.who == "program" and clues.preamble == "preloaded" else ()
+    if not owners:
         return ""
-    return f"{name[1]} belongs to {' and '.join(owners)}: write {' or '.join(f'{each}.{name[1]}' for each in owners)}."
+    return f"{name} belongs to {' and '.join(owners)}: write {' or '.join(f'{each}.{name}' for each in owners)}."
 
 
 def advise_on_constant(fault: Fault, *_: object) -> str:
     """Return advice on ``null`` or ``true``, as written in JSON."""
-    name = UNDEFINED_NAME.match(fault.message)
-    return f"Write {_CONSTANTS[name[1]]} in place of {name[1]}." if name and name[1] in _CONSTANTS else ""
+    name = _find_undefined_name(fault)
+    return f"Write {_CONSTANTS[name]} in place of {name}." if name in _CONSTANTS else ""
 
 
 def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a name that only the other process (robot or responder) defines."""
-    name = UNDEFINED_NAME.match(fault.message)
-    if name is None or listing is None:
+    name = _find_undefined_name(fault)
+    if not name or listing is None:
         return ""
     robots = {each.name for each in clues.programs}
     is_robot = listing.name in robots
     other_listings = (each for each in clues.listings if (each.name in robots) != is_robot)
-    defining_listing, definition = next(_collect_definitions(name[1], other_listings), (None, None))
+    defining_listing, definition = next(_collect_definitions(name, other_listings), (None, None))
     if (
         defining_listing is None
         or definition is None
-        or next(_collect_definitions(name[1], _list_process_listings(listing, clues)), None)
+        or next(_collect_definitions(name, _list_process_listings(listing, clues)), None)
     ):
         return ""
     owner = defining_listing.name.capitalize() if defining_listing.part is None else defining_listing.name
@@ -85,34 +83,32 @@ def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None,
         )
     explanation = "a robot program does not see it" if is_robot else "the responder does not see it"
     position = ", below its first line" if listing.part is None and is_robot else ""
-    return f"{owner} defines {name[1]}, but {explanation}. Define {name[1]} in {listing.name} as well{position}."
+    return f"{owner} defines {name}, but {explanation}. Define {name} in {listing.name} as well{position}."
 
 
 def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
     """Return advice on a name that a later cell, not a robot program, defines."""
-    name = UNDEFINED_NAME.match(fault.message)
-    if name is None or listing is None or fault.cell is None:
+    name = _find_undefined_name(fault)
+    if not name or listing is None or fault.cell is None:
         return ""
     cells = [each for each in _list_process_listings(listing, clues) if each.part is None]
-    later_cell = next((each for each, _ in _collect_definitions(name[1], cells[cells.index(listing) + 1 :])), None)
+    later_cell = next((each for each, _ in _collect_definitions(name, cells[cells.index(listing) + 1 :])), None)
     if later_cell is None:
         return ""
     return (
-        f"{later_cell.name.capitalize()} defines {name[1]}, but runs later. Move {later_cell.name} above "
-        f"{listing.name}."
+        f"{later_cell.name.capitalize()} defines {name}, but runs later. Move {later_cell.name} above {listing.name}."
     )
 
 
 def advise_on_later_line(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a function that is defined after the line that calls it."""
-    name = UNDEFINED_NAME.match(fault.message)
-    if name is None or listing is None or statement is None or listing.code.list_enclosing(statement):
+    name = _find_undefined_name(fault)
+    if not name or listing is None or statement is None or listing.code.list_enclosing(statement):
         return ""
     for following in listing.code.list_following(statement):
-        if not following.indent and following.keyword == "def" and name[1] in following.bound_names:
+        if not following.indent and following.keyword == "def" and name in following.bound_names:
             return (
-                f"Line {following.line} defines {name[1]}, but is below. Move line {statement.line} below the "
-                "definition."
+                f"Line {following.line} defines {name}, but is below. Move line {statement.line} below the definition."
             )
     return ""
 
@@ -121,10 +117,10 @@ def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | No
     """Return advice on a module or function whose name was assigned another value."""
     if listing is None or statement is None:
         return ""
-    match = _NO_ATTRIBUTE.match(fault.message)
-    if match:
-        owners = _collect_owners(match[2], statement)
-    elif _NOT_CALLABLE.match(fault.message):
+    values = read_values(fault, FaultKind.NO_ATTRIBUTE)
+    if values:
+        owners = _collect_owners(values[1], statement)
+    elif is_kind(fault, FaultKind.NOT_CALLABLE):
         # The tokenizer returns an f-string as one token, so calls in it are searched by pattern.
         owners = _CALL.findall("".join(listing.lines[statement.line - 1 : statement.last_line]))
     else:
@@ -143,6 +139,12 @@ def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | No
                         "name there."
                     )
     return ""
+
+
+def _find_undefined_name(fault: Fault) -> str:
+    """Return the name that is not defined; empty if the fault is of another kind."""
+    (name,) = read_values(fault, FaultKind.UNDEFINED_NAME) or ("",)
+    return name
 
 
 def _is_shared_name(name: str, listing: Listing, clues: Clues) -> bool:

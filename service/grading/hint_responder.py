@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 
 from responders.message_format import JSON
+from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_files import hint_about_redefined_functions
@@ -17,16 +18,9 @@ from service.grading.hint_formats import describe_return_line, hint_about_answer
 from service.grading.judging.message_parts import quote_text
 from submissions.raw_files import sanitise_name
 
-_MISSING_RESPONDER = "there is no responder: "
-_NOTHING_RETURNED = "the responder returned NoneType"
-_NO_FUNCTION = re.compile(r"there is no function called (\w+)")
-_BAD_CALL = re.compile(r"TypeError: (\w+)\(\) (?:takes|missing)")
-_NOT_CALLABLE = "roboSim.pyresponder is "
-_UNREADABLE = re.compile(r"the responder returned \w+|begins with JSON:: but is not JSON")
 _DOUBLE_JSON = re.compile(r'JSON::\s*"')
 _MIN_SIMILARITY = 0.75
 _RESPONDER = re.compile(r"responder\Z|\w+_responder\Z")
-_EMPTY = re.compile(r"IndexError: list index out of range")
 _RETURN = re.compile(r"\breturn\b")
 _COLON = (('":"',), ("':'",))
 _MAX_CONTENT_LENGTH = 12
@@ -35,8 +29,8 @@ _PY = re.compile(r"""["']PY::""")
 
 def hint_about_misnamed_function(clues: Clues) -> Iterator[str]:
     """Yield a hint on a required function that exists under a similar name."""
-    names = (_NO_FUNCTION.search(fault.message) for fault in clues.faults)
-    required_name = next((name[1] for name in names if name), None)
+    fault_values = (read_values(fault, FaultKind.MISSING_FUNCTION) for fault in clues.faults)
+    required_name = next((values[0] for values in fault_values if values), None)
     if required_name is None:
         return
     functions = [(one, each) for one in clues.responders for each in one.code.list_functions() if not each.indent]
@@ -50,7 +44,7 @@ def hint_about_misnamed_function(clues: Clues) -> Iterator[str]:
 
 def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
     """Yield a hint on a function that was probably meant as the responder, or that there is none."""
-    if clues.missing == "responder" or not any(_MISSING_RESPONDER in fault.message for fault in clues.faults):
+    if clues.missing == "responder" or not any(is_kind(fault, FaultKind.MISSING_RESPONDER) for fault in clues.faults):
         return
     if clues.idle_responder:
         yield (
@@ -97,14 +91,13 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
 def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
     """Yield a hint on a responder that does not take exactly one argument, or is not a function."""
     for fault in clues.faults:
-        call_match = _BAD_CALL.match(fault.message)
-        if fault.who != "responder" or not (call_match or _NOT_CALLABLE in fault.message):
+        owner, called_name = read_values(fault, FaultKind.WRONG_ARGUMENTS) or ("", "")
+        is_bad_call = bool(called_name) and not owner
+        if fault.who != "responder" or not (is_bad_call or is_kind(fault, FaultKind.RESPONDER_NO_FUNCTION)):
             continue
         for listing in clues.responders:
             for statement in listing.code.statements:
-                is_function = (
-                    call_match is not None and fault.line is None and statement.tokens[:2] == ("def", call_match[1])
-                )
+                is_function = is_bad_call and fault.line is None and statement.tokens[:2] == ("def", called_name)
                 if is_function and ":" in statement.tokens:
                     count = _describe_parameters(statement)
                     yield (
@@ -112,7 +105,7 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
                         f"but it is called with one text. Write def {statement.tokens[1]}(text):"
                     )
                     return
-                if not call_match and statement.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
+                if not is_bad_call and statement.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
                     name = statement.tokens[4]
                     yield (
                         f"{listing.locate(statement.line)} assigns a text to roboSim.pyresponder; expected a function. "
@@ -123,7 +116,7 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
 
 def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a responder that ends without a return, in some or all branches."""
-    if not any(fault.message.startswith(_NOTHING_RETURNED) for fault in clues.faults):
+    if not any(is_kind(fault, FaultKind.NO_ANSWER) for fault in clues.faults):
         return
     for listing in clues.responders:
         for head in listing.code.list_functions():
@@ -154,8 +147,9 @@ def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
 
 def hint_about_unreadable_answers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a return value that is not a text, or has invalid JSON after ``JSON::``."""
-    fault = next((each for each in clues.faults if _UNREADABLE.search(each.message) and not each.agent), None)
-    if fault is None or _NOTHING_RETURNED in fault.message:
+    unreadable_faults = (each for each in clues.faults if is_kind(each, FaultKind.UNREADABLE_ANSWER))
+    fault = next((each for each in unreadable_faults if not each.agent), None)
+    if fault is None or is_kind(fault, FaultKind.NO_ANSWER):
         return
     for listing in clues.responders:
         for head in listing.code.list_functions():
@@ -215,7 +209,7 @@ def hint_about_single_colon(clues: Clues) -> Iterator[str]:
 
 def hint_about_unqueued_answers(clues: Clues) -> Iterator[str]:
     """Yield a hint on an empty queue if no answer begins with JSON::, with the line that answers."""
-    is_queue_empty = any(_EMPTY.match(fault.message) and fault.who == "program" for fault in clues.faults)
+    is_queue_empty = any(is_kind(fault, FaultKind.LIST_INDEX) and fault.who == "program" for fault in clues.faults)
     if (
         not is_queue_empty
         or not clues.should_use_queue

@@ -5,23 +5,20 @@ For agents and methods the definition is wrong, because others call them. Otherw
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from service.grading.fault_kinds import FaultKind, read_values
 from service.grading.hint_clues import Clues, Listing, describe_fault_line
 from service.grading.hint_code import Statement, is_name
-
-_CALL = re.compile(r"TypeError: (?:(\w+)\.)?(\w+)\(\) (?:takes|missing) (\w+)(?:.* but (\d+) (?:was|were) given)?")
 
 
 def hint_about_signatures(clues: Clues) -> Iterator[str]:
     """Yield a hint on the definition that does not match a call."""
     for fault in clues.faults:
-        match = _CALL.match(fault.message)
-        listing, head = _find_definition(match[2], clues) if match else (None, None)
-        if match is None or listing is None or head is None:
+        _, name = read_values(fault, FaultKind.WRONG_ARGUMENTS) or ("", "")
+        listing, head = _find_definition(name, clues) if name else (None, None)
+        if listing is None or head is None:
             continue
-        name = match[2]
         enclosing_class = next((each for each in listing.code.list_enclosing(head) if each.keyword == "class"), None)
         if enclosing_class is not None and "self" not in head.tokens:
             parameters = "".join(f", {each}" for each in _list_parameters(head))

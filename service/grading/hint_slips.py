@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 
+from service.grading.fault_kinds import FaultKind, is_kind
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CodeStatements, Statement, compute_bracket_depths, is_name, join_tokens
 from service.grading.hint_loops import find_reading
@@ -44,7 +45,7 @@ def hint_about_slips(clues: Clues) -> Iterator[str]:
 
 def hint_about_missing_comma(clues: Clues) -> Iterator[str]:
     """Yield a hint on a list with a missing comma, if a list index was out of range."""
-    if not any("IndexError: list index out of range" in fault.message for fault in clues.faults):
+    if not any(is_kind(fault, FaultKind.LIST_INDEX) for fault in clues.faults):
         return
     for listing in clues.texts:
         for statement in listing.code.statements:

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import re
 
+from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement
 from sim.recording import Fault
 
 _ELSE_IF = re.compile(r"\s*(else\s+if|else?if|elsif|elf)\b")
-_NO_BLOCK = re.compile(r"IndentationError: expected an indented block after (.{1,60}?) on line (\d+)")
-_UNCLOSED_TEXT = re.compile(r"SyntaxError: unterminated (triple-quoted )?(?:f-)?string literal")
 _WORDS = re.compile(r"\b(say|print|speak)\(\s*([^\W\d]\w*(?:[ ]+[\w!?.]+)+)\s*(?=[,)])")
 _NO_TEXT = re.compile(r"\b(?:and|or|not|if|else|for|in|is|lambda|f)\b")
 _KEYWORD_ARGUMENT = re.compile(r",\s*\w+\s*=\s*\w+\s*\)*\s*$")
@@ -22,7 +21,8 @@ _INDENT_WIDTH = 4
 
 def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
     """Return the fix of a line that Python cannot parse; empty if it is unclear."""
-    if listing is None or fault.line is None or not fault.message.startswith(("SyntaxError", "IndentationError")):
+    is_unreadable = is_kind(fault, FaultKind.SYNTAX_ERROR, FaultKind.INDENTATION_ERROR)
+    if listing is None or fault.line is None or not is_unreadable:
         return ""
     line = "".join(listing.lines[fault.line - 1 : fault.line])
     return (
@@ -43,10 +43,10 @@ def _advise_on_else_if(line: str) -> str:
 
 def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
     """Return the fix of a line that is not indented deeper than the block's head above it."""
-    match = _NO_BLOCK.match(fault.message)
-    if match is None:
+    values = read_values(fault, FaultKind.NO_BLOCK)
+    if values is None:
         return ""
-    head = int(match[2])
+    head = int(values[0])
     width = _count_indent("".join(listing.lines[head - 1 : head])) + _INDENT_WIDTH
     if not line.strip() or fault.line == head:
         return f"Write the lines that belong to line {head} below it. Begin each with {width} blanks."
@@ -55,10 +55,10 @@ def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
 
 def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
     """Return the line with its missing closing quote."""
-    match = _UNCLOSED_TEXT.match(fault.message)
-    if match is None:
+    values = read_values(fault, FaultKind.UNCLOSED_TEXT)
+    if values is None:
         return ""
-    if match[1]:
+    if values[0]:
         return "A text that begins with three quotes must end with three quotes."
     opening = _find_open_quote(line)
     if opening is None:

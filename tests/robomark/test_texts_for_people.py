@@ -19,9 +19,8 @@ _NAMES = _FIELDS | {"note"}
 _PARTS = {"endswith", "find", "partition", "removeprefix", "removesuffix", "rpartition", "startswith"}
 _PATTERNS = {"findall", "finditer", "fullmatch", "match", "search"}
 
-_OF_PYTHON = "what Python says of a student's mistake is a text, also in the recordings of old grades"
+_OF_PYTHON = "reads, for all hints, the sentences of Python, which has no codes for mistakes"
 _OF_CRITERIA = "a hint reads what the criterion's message says; results of criteria have no state of their own yet"
-_BOTH = f"{_OF_PYTHON}; {_OF_CRITERIA}"
 _OF_REPORTS = "finds the hint, the fault and the evidence that say the same, so as to say it once"
 #: For each file, the number of such places and the reason.
 _ALLOWED: dict[str, tuple[int, str]] = {
@@ -30,21 +29,15 @@ _ALLOWED: dict[str, tuple[int, str]] = {
     "responders/sandbox/inside/name_suggestions.py": (2, "ImportError of Python's has no code for what is missing"),
     "responders/sandbox/inside/responder_role.py": (1, "no text: message is a frame"),
     "service/commands/grading.py": (1, "leaves out of a row's reason the file's name, which the row has"),
-    "service/grading/hint_answers.py": (3, _BOTH),
+    "service/grading/fault_kinds.py": (1, _OF_PYTHON),
+    "service/grading/hint_answers.py": (2, _OF_CRITERIA),
     "service/grading/hint_cause_lines.py": (4, _OF_CRITERIA),
-    "service/grading/hint_errors.py": (13, _OF_PYTHON),
     "service/grading/hint_formulas.py": (1, _OF_CRITERIA),
-    "service/grading/hint_functions.py": (10, _BOTH),
+    "service/grading/hint_functions.py": (9, _OF_CRITERIA),
     "service/grading/hint_loops.py": (1, _OF_REPORTS),
     "service/grading/hint_motion.py": (1, _OF_CRITERIA),
-    "service/grading/hint_names.py": (7, _OF_PYTHON),
     "service/grading/hint_recognition.py": (1, _OF_CRITERIA),
     "service/grading/hint_repetition.py": (2, _OF_CRITERIA),
-    "service/grading/hint_responder.py": (8, _BOTH),
-    "service/grading/hint_formats.py": (1, _OF_PYTHON),
-    "service/grading/hint_signatures.py": (1, _OF_PYTHON),
-    "service/grading/hint_slips.py": (1, _OF_PYTHON),
-    "service/grading/hint_syntax.py": (3, _OF_PYTHON),
     "service/grading/hint_timing.py": (2, _OF_CRITERIA),
     "service/grading/hint_values.py": (4, _OF_CRITERIA),
     "service/reports/diagnosis.py": (8, _OF_REPORTS),
