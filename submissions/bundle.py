@@ -339,7 +339,8 @@ def _find_notebook(files: dict[str, bytes], source_name: str, notes: list[str]) 
             notes.extend(loaded.notes)
             return loaded.notebook
     except UsageError as error:
-        has_prefix = str(error).startswith(source_name)
+        # Errors name the notebook, and one in a folder may have the folder's name.
+        has_prefix = len(names) > 1 or sanitise_name(names[0]).startswith(source_name)
         sentence = (
             error.message
             if has_prefix

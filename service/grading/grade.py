@@ -5,11 +5,12 @@ This module contains data only. ``judge.py`` and ``grader.py`` create grades; re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 
 from responders.sandbox.meter import JobCosts, JobLimits
+from service.grading.findings import Finding
 from sim.recording import Image, Pose, Recording, Verdict
 from sim.recording_values import decide_verdict
 from submissions.seeds import PUBLIC_SECRET
@@ -166,6 +167,8 @@ class CriterionResult:
     unjudged: str = ""  # why it could not be judged, for staff; otherwise empty
     for_staff: str = ""  # what staff should check; not shown to students
     set_by_hand: StaffAdjustment | None = None  # None if the marks are as graded
+    #: By trial; None for what was judged once for all of them. Empty in a grade from the database.
+    findings: Mapping[int | None, tuple[Finding, ...]] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def worth(self) -> Decimal:

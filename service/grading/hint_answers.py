@@ -12,8 +12,8 @@ from collections.abc import Iterator
 
 from responders.message_format import JSON
 from service.grading.fault_kinds import FaultKind, read_values
-from service.grading.grade import CriterionResult
-from service.grading.hint_clues import Clues, describe_first_failure
+from service.grading.findings import MissingEntry, OtherAnswer
+from service.grading.hint_clues import Clues, find_finding
 from service.grading.hint_code import join_tokens
 from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
@@ -26,12 +26,10 @@ from submissions.criteria.reporting import Reports
 from submissions.criteria.unreliable_channel import FreshAnswers, Resends
 
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
-_AFTER = re.compile(r'"([^"]+)" did not come after "(\w+)"')
 _NONE_VALUE = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
 _IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
 _MIN_SIMILARITY = 0.6
-_VALUE = re.compile(r'but it (?:answered|has) "([^"]{1,80})"')
 #: The number of answers that show a constant shift.
 _MIN_SHIFTED_ANSWERS = 2
 
@@ -98,16 +96,16 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
     for criterion in clues.costliest_criteria[:1]:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
-        match = _VALUE.search(describe_first_failure(clues, criterion)) if path else None
-        location = _describe_key_line([path.rpartition(".")[2]], clues) if match else ""
-        if match is None or not location or not isinstance(criterion, Replies):
+        answer = clues.find_finding(criterion, OtherAnswer) if path else None
+        location = _describe_key_line([path.rpartition(".")[2]], clues) if answer else ""
+        if answer is None or not location or not isinstance(criterion, Replies):
             continue
-        expected = next((each for each in criterion.expect.values() if str(each).endswith(match[1])), "")
-        advice = advise_on_difference(expected, match[1]) if expected and isinstance(expected, str) else ""
-        if match[1].startswith("["):
+        expected = next((each for each in criterion.expect.values() if str(each).endswith(answer.text)), "")
+        advice = advise_on_difference(expected, answer.text) if expected and isinstance(expected, str) else ""
+        if answer.text.startswith("["):
             advice = "It is a list or an array: take its first value with [0]"
         if advice:
-            yield f"{location} answers {quote_text(match[1])} at {path}. {advice}"
+            yield f"{location} answers {quote_text(answer.text)} at {path}. {advice}"
             return
 
 
@@ -115,9 +113,10 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number of the answers that is too large or too small by the same amount in every trial."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
-        failure_messages = [each.message for each in result.evidence if not each.passed] if result.id in reports else []
-        pairs = {found for each in failure_messages if (found := _compute_shift(each)) is not None}
-        if len(failure_messages) < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
+        failure_count = sum(not each.passed for each in result.evidence) if result.id in reports else 0
+        entries = (each for findings in result.findings.values() for each in findings if isinstance(each, MissingEntry))
+        pairs = {found for each in entries if (found := _compute_shift(each)) is not None}
+        if failure_count < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
             continue
         key, shift = pairs.pop()
         location = _describe_key_line([key], clues)
@@ -131,23 +130,22 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
             return
 
 
-def _compute_shift(message: str) -> tuple[str, int] | None:
+def _compute_shift(missing: MissingEntry) -> tuple[str, int] | None:
     """Return the key and expected minus actual value of an answer; None if they are no whole numbers."""
-    match, answer = _AFTER.search(message), message.partition(JSON)[2].rpartition('"')[0]
-    value = _unwrap_object(JSON + answer).get(match[2]) if match is not None else None
-    if match is None or not isinstance(value, int) or not match[1].isdigit():
+    value = _unwrap_object(missing.texts[0]).get(missing.previous) if len(missing.texts) == 1 else None
+    if not isinstance(value, int) or not missing.entry.isdigit():
         return None
-    return match[2], int(match[1]) - value
+    return missing.previous, int(missing.entry) - value
 
 
 def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
     """Yield a hint on a number that belongs to another key of the answer."""
     reports = {each.id for each in clues.lost if isinstance(each, Reports) and each.source == "reply"}
     for result in clues.results:
-        match = _AFTER.search(_join_messages(result)) if result.id in reports else None
-        for answer in clues.answers if match else ():
+        missing = find_finding(result, MissingEntry) if result.id in reports else None
+        number, key = (missing.entry, missing.previous) if missing else ("", "")
+        for answer in clues.answers if key else ():
             values = _unwrap_object(answer)
-            number, key = match.groups() if match else ("", "")
             other_key = next((each for each, value in values.items() if each != key and str(value) == number), None)
             if any(True for _ in hint_about_shifted_numbers(clues)):
                 return
@@ -239,7 +237,3 @@ def _describe_key_line(keys: list[str], clues: Clues) -> str:
             if line is not None:
                 return listing.locate(line)
     return ""
-
-
-def _join_messages(result: CriterionResult) -> str:
-    return " ".join((result.message, *(each.message for each in result.evidence)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from service.grading.findings import MissingEntry, StrayItems
 from service.grading.hint_clues import Clues, describe_first_failure
 from service.grading.hint_functions import hint_about_wrong_values
 from service.grading.hint_motion import STOPPING_CRITERIA
@@ -24,18 +25,18 @@ from submissions.criteria.texts import TextSequence
 _SPEECH_FUNCTIONS = frozenset({"say", "speak"})
 _PRINT_FUNCTIONS = frozenset({"print"})
 _TEXT_CRITERIA = (Reports, Events, WordSequence, TextSequence, Datalog)
-_LABEL = re.compile(r'did not come after "([^"]{1,40})"')
-_EXPECTED = re.compile(r"Expected ")
 
 
 def hint_about_cause_line(clues: Clues) -> Iterator[str]:
     """Yield the result of the criterion that lost most, prefixed with its line."""
     for criterion in clues.costliest_criteria[:1]:
-        message = describe_first_failure(clues, criterion)
-        if isinstance(criterion, Functions) and _EXPECTED.match(message):
-            yield hint_about_wrong_values(criterion.function, message)
+        message, strays = describe_first_failure(clues, criterion), clues.find_finding(criterion, StrayItems)
+        if not message or (strays is not None and strays.is_only_problem):
+            continue
+        if isinstance(criterion, Functions):
+            yield hint_about_wrong_values(criterion, message, clues)
             return
-        location = _describe_cause_line(criterion, message, clues) if _EXPECTED.match(message) else ""
+        location = _describe_cause_line(criterion, message, clues)
         if location:
             yield f"{location}: {message[0].lower()}{message[1:].rstrip('.')}"
 
@@ -43,9 +44,10 @@ def hint_about_cause_line(clues: Clues) -> Iterator[str]:
 def _describe_cause_line(criterion: Criterion, message: str, clues: Clues) -> str:
     """Return the position of the cause; empty if it is unknown or ambiguous."""
     if isinstance(criterion, Reports) and criterion.source == "reply":
-        key = _LABEL.search(message)
+        missing = clues.find_finding(criterion, MissingEntry)
+        key = missing.previous if missing else ""
         locations = [
-            clues.describe_matching_line("responder", re.compile(rf"""["']{re.escape(key[1])}["']""")) if key else ""
+            clues.describe_matching_line("responder", re.compile(rf"""["']{re.escape(key)}["']""")) if key else ""
         ]
     elif isinstance(criterion, _TEXT_CRITERIA):
         is_speech = getattr(criterion, "source", "") == "speech" or criterion.check == "says"

@@ -9,7 +9,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
+from service.grading.findings import Finding
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
@@ -24,6 +26,7 @@ from submissions.submission import PART_FILES, SECOND_PROGRAM, Part, Submission
 _MAX_LINES, _MAX_LINE_LENGTH = 5000, 300
 _MAX_TEXTS, MAX_TEXT_LENGTH = 400, 300
 _MAX_EXTRA_FILES = 20
+F = TypeVar("F", bound=Finding)
 _QUEUE = re.compile("pyState")
 
 
@@ -184,6 +187,16 @@ class Clues:
         """The distinct answers of the responder."""
         return self._collect_messages("responder")
 
+    def find_finding(self, criterion: Criterion, kind: type[F]) -> F | None:
+        """Return the first finding of this kind about a criterion that lost marks; None if there is none."""
+        return find_finding(next((each for each in self.results if each.id == criterion.id), None), kind)
+
+    def find_measures(self, criterion: Criterion) -> dict[str, float]:
+        """Return the measures of the first failure of a criterion that lost marks, by name; empty without one."""
+        result = next((each for each in self.results if each.id == criterion.id), None)
+        failure = next((each for each in result.evidence if not each.passed), None) if result else None
+        return {each.name: each.value for each in failure.measures} if failure else {}
+
     def list_texts(self, part: Part) -> Iterator[Listing]:
         """Return the texts that may contain the part."""
         return (each for each in self.listings if each.part in (part, None))
@@ -241,11 +254,21 @@ def collect_clues(
 def _remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -> CriterionResult:
     """Return the result without anything that comes from hidden trials."""
     evidence = tuple(each for each in result.evidence if each.trial in visible_indices)
+    findings = {index: each for index, each in result.findings.items() if index is None or index in visible_indices}
     if len(evidence) == len(result.evidence):
         return result
     message = " ".join(each.message for each in evidence if not each.passed)
     accuracy = result.shown.accuracy if result.shown is not None else None
-    return replace(result, evidence=evidence, message=message, accuracy=accuracy, predictions=(), curves=(), shown=None)
+    return replace(
+        result,
+        evidence=evidence,
+        message=message,
+        accuracy=accuracy,
+        predictions=(),
+        curves=(),
+        shown=None,
+        findings=findings,
+    )
 
 
 def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
@@ -278,6 +301,12 @@ def _collect_distinct_texts(texts: Iterator[str]) -> tuple[str, ...]:
         if len(distinct_texts) == _MAX_TEXTS:
             break
     return tuple(distinct_texts)
+
+
+def find_finding(result: CriterionResult | None, kind: type[F]) -> F | None:
+    """Return the first finding of this kind; None without one or without a result."""
+    findings = result.findings.values() if result is not None else ()
+    return next((each for one in findings for each in one if isinstance(each, kind)), None)
 
 
 def describe_first_failure(clues: Clues, criterion: Criterion) -> str:

@@ -5,19 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from sim.readers.json_text import read_json
-from sim.readers.reader_errors import UnreadableDataError
-
-_MAX_CHARACTERS = 20_000
-
-
-def parse_value(text: str) -> object:
-    """Return the value that a message shows as JSON; the text itself if it is none."""
-    try:
-        return read_json(text[:_MAX_CHARACTERS])
-    except (UnreadableDataError, ValueError):
-        return text
-
 
 def advise_on_difference(expected: object, actual: object) -> str:
     """Return what to change, if the two values show it; otherwise empty."""

@@ -10,8 +10,9 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from service.grading.findings import ExtraText, LateResend, MissingAnswer, OtherMove, StillRunning
 from service.grading.grade import Evidence
-from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_clues import Clues, F, Listing
 from service.grading.hint_code import CallInCode, Statement, join_tokens
 from service.grading.hint_counterfactuals import format_rounded
 from service.grading.hint_structure import has_motor_call
@@ -26,9 +27,6 @@ from submissions.criteria.motion import Moves
 from submissions.criteria.stopping import StopOn
 from submissions.criteria.unreliable_channel import Resends
 
-_DURATION = re.compile(r"in (\d+\.\d+) s\b")
-_UNWANTED = re.compile(r'but it (?:sent|printed|said) "([^"]+)" as well')
-_SENT_ONCE = re.compile(r"it sent the message (?:once|\d+ times?), last at .* no answer came")
 _ONE_SENSOR = re.compile(r"\b(left|right) (?:light )?sensor\b", re.IGNORECASE)
 _OTHER_SIDE = re.compile(r"to the (left|right)\b.* but it was .*to the (?!\1)(?:left|right)")
 _WRITING_FUNCTIONS = frozenset({"print", "say", "speak"})
@@ -46,6 +44,11 @@ class _Failure:
     listing: Listing
     lines: Sequence[Statement]
     task: str
+    clues: Clues
+
+    def find_finding(self, kind: type[F]) -> F | None:
+        """Return the first finding of this kind about the criterion; None if there is none."""
+        return self.clues.find_finding(self.criterion, kind)
 
     @property
     def message_clause(self) -> str:
@@ -114,6 +117,7 @@ def _find_failure(clues: Clues, criterion: Criterion) -> _Failure | None:
         listing,
         _list_lines_before(recording, listing, failed_evidence),
         clues.task,
+        clues,
     )
 
 
@@ -136,14 +140,14 @@ def _list_lines_before(recording: Recording, listing: Listing, evidence: Evidenc
 
 def _hint_about_duration(failure: _Failure) -> str:
     """Return a hint on a move that lasted too long or too briefly, with the number of seconds to write."""
-    duration_match = _DURATION.search(failure.found)
+    move = failure.find_finding(OtherMove)
     required_moves = failure.criterion.moves if isinstance(failure.criterion, Moves) else ()
     ranges = [each.seconds for each in required_moves if each.seconds]
     move_statement = next((each for each in failure.lines if has_motor_call(each, LIMITED_MOVES)), None)
-    if duration_match is None or len(ranges) != 1 or move_statement is None:
+    if move is None or len(ranges) != 1 or move_statement is None:
         return ""
     minimum, maximum = ranges[0]
-    seconds = float(duration_match[1])
+    seconds = round(move.seconds, 2)
     if minimum <= seconds <= maximum or not seconds:
         return ""
     call = next(each for each in move_statement.calls if each.name.rpartition(".")[2] in LIMITED_MOVES)
@@ -162,13 +166,12 @@ def _hint_about_duration(failure: _Failure) -> str:
 
 def _hint_about_unwanted_text(failure: _Failure) -> str:
     """Return a hint on a text that is not expected: the line that wrote it, and the condition that led there."""
-    text_match = _UNWANTED.search(failure.found)
+    extra_text = failure.find_finding(ExtraText)
     statement = next(
         (each for each in failure.lines if any(call.name in _WRITING_FUNCTIONS for call in each.calls)), None
     )
-    if text_match is None or statement is None:
+    if extra_text is None or statement is None:
         return ""
-    text = text_match[1]
     head = next((each for each in failure.listing.code.list_enclosing(statement) if each.keyword in _BLOCK_HEADS), None)
     if head is None:
         fix = "Remove this line, or write another text"
@@ -176,7 +179,8 @@ def _hint_about_unwanted_text(failure: _Failure) -> str:
         fix = f"Check the values of the loop in line {head.line}: {join_tokens(head.tokens[1:]).rstrip(':')}"
     else:
         fix = f"Check the condition in line {head.line}: {join_tokens(head.condition)}. It must be false then"
-    return f"{failure.listing.locate(statement.line)} writes {quote_text(text)}: {failure.message_clause}. {fix}"
+    text = quote_text(extra_text.text)
+    return f"{failure.listing.locate(statement.line)} writes {text}: {failure.message_clause}. {fix}"
 
 
 def _hint_about_resending(failure: _Failure) -> str:
@@ -185,12 +189,12 @@ def _hint_about_resending(failure: _Failure) -> str:
     if not isinstance(failure.criterion, Resends) or statement is None:
         return ""
     loop = next((each for each in failure.listing.code.list_enclosing_loops(statement) if each is not statement), None)
-    if "after its answer had come" in failure.found and loop is not None:
+    if failure.find_finding(LateResend) is not None and loop is not None:
         return (
             f"{failure.listing.locate(statement.line)} sends the message again although its answer had come. Leave the "
             f"loop in line {loop.line} as soon as the answer is there, for example with break below if messages:"
         )
-    if "no answer came" not in failure.found:
+    if failure.find_finding(MissingAnswer) is None:
         return ""
     if loop is None:
         return (
@@ -248,7 +252,7 @@ def _hint_about_loop_end(failure: _Failure) -> str:
     condition = join_tokens(loop.condition)
     last_reading, required_reading = _describe_readings(failure)
     body = code.list_body(loop)
-    if "still running" in failure.found:
+    if failure.find_finding(StillRunning) is not None:
         condition_advice = (
             f" In the right place the sensor reads {required_reading}: it must be false there"
             if required_reading

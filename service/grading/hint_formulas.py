@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from service.grading.findings import MissingEntry
 from service.grading.hint_clues import Clues, Listing, find_listing
 from service.grading.hint_code import join_tokens
 from service.grading.hint_loops import find_reading
@@ -26,7 +27,7 @@ from submissions.criteria.two_robots import Apart
 _DISTANCES = ("distance_centimeters", "distance_inches")
 _MIN_BACKWARDS_MM = 20.0
 _DIAMETER_NAME = re.compile(r"^d$|diam|wheel|width|across", re.IGNORECASE)
-_ASKED_NUMBER = re.compile(r'"(\d+(?:\.\d+)?)" (?:\(within|did not)')
+_POSITIVE_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 _HALF_TOLERANCE = 0.05
 
@@ -78,21 +79,20 @@ def hint_about_division(clues: Clues) -> Iterator[str]:
 
 def hint_about_radius(clues: Clues) -> Iterator[str]:
     """Yield a hint on a reported length that is half of the expected one, because a radius was used."""
-    results = [
-        each for each in clues.results if any(each.id == one.id for one in clues.lost if isinstance(one, Reports))
-    ]
-    for result in results:
-        required_match = _ASKED_NUMBER.search(result.message)
-        reported_numbers = _NUMBER.findall(result.message.rpartition(": ")[2])
-        if required_match is None or len(reported_numbers) != 1 or not float(required_match[1]):
+    for criterion in clues.lost:
+        missing = clues.find_finding(criterion, MissingEntry)
+        if missing is None or not _POSITIVE_NUMBER.fullmatch(missing.entry):
             continue
-        is_half = abs(float(reported_numbers[0]) / float(required_match[1]) - 0.5) < _HALF_TOLERANCE
+        reported_numbers = [number for text in missing.texts for number in _NUMBER.findall(text)]
+        if len(reported_numbers) != 1 or not float(missing.entry):
+            continue
+        is_half = abs(float(reported_numbers[0]) / float(missing.entry) - 0.5) < _HALF_TOLERANCE
         for listing, statement in collect_statements(clues) if is_half else ():
             pi_index = next((at for at, token in enumerate(statement.tokens[:-2]) if token == "pi"), None)
             if pi_index is not None and statement.tokens[pi_index + 1] == "*":
                 yield (
                     f"{listing.locate(statement.line)}: the result {reported_numbers[0]} is half of "
-                    f"{required_match[1]}. A wheel's circumference is pi times the diameter. If "
+                    f"{missing.entry}. A wheel's circumference is pi times the diameter. If "
                     f"{statement.tokens[pi_index + 2]} is the radius, multiply it by 2"
                 )
                 return

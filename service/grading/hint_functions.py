@@ -6,44 +6,30 @@ Calls and return values come from the criteria's results. No robot runs.
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterator
 
-from service.grading.fault_kinds import FaultKind, read_values
+from service.grading.fault_kinds import FaultKind, is_kind, read_values
+from service.grading.findings import FailedCall, UnloadedResponder, WrongHiddenCalls, WrongReturn
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, guess_result_name, join_tokens
-from service.grading.hint_differences import advise_on_difference, parse_value
+from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_errors import describe_error
 from sim.recording import Fault, Verdict
 from submissions.criteria.code import Functions
 from submissions.raw_files import sanitise_name
 
-_RETURNED_NOTHING = re.compile(r"returned (?:null|None|NoneType)")
-_NO_FUNCTION = "there is no function called"
-_HIDDEN_CALLS = "hidden calls"
-_CALL = re.compile(r"Expected (\w+)\(")
-#: The expected list and the returned list.
-_LISTS = re.compile(r"to return (\[[^\]]+\]), but it returned (\[[^\]]*\])")
-_FAILED = re.compile(r"(?:but it did not|to be loaded, but): (\w+: .{1,300}?) \(line (\d+)\)")
 _MIN_SIMILARITY = 0.75
-
-
-#: The expected value and the returned value.
-_VALUES = re.compile(r"to return (.+?), but it returned (.+?)(?: \(\d+ of \d+ calls correct\))?\.?\Z", re.DOTALL)
 
 
 def hint_about_returned_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value, and how the value differs from the expected one."""
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.costliest_criteria:
-        message = messages.get(criterion.id, "") if isinstance(criterion, Functions) else ""
-        call_match, value_match = _CALL.search(message), _VALUES.search(message)
-        if call_match is None or value_match is None:
+        message, wrong = messages.get(criterion.id, ""), clues.find_finding(criterion, WrongReturn)
+        if wrong is None:
             continue
-        advice = advise_on_difference(parse_value(value_match[1]), parse_value(value_match[2]))
-        if not advice and value_match[2].startswith("[["):
-            advice = advise_on_difference([], [[]])
-        value_statement = _find_value_statement(call_match[1], clues)
+        advice = advise_on_difference(wrong.expected, wrong.returned)
+        value_statement = _find_value_statement(wrong.function, clues)
         if value_statement is not None:
             listing, statement = value_statement
             fix = advice or "Work this call out by hand, line by line, and compare"
@@ -57,8 +43,7 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
 def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
     """Yield a hint on an ``except`` that catches too few errors, if only hidden calls failed."""
     for criterion in clues.costliest_criteria:
-        message = next((each.message for each in clues.results if each.id == criterion.id), "")
-        if not isinstance(criterion, Functions) or _HIDDEN_CALLS not in message:
+        if clues.find_finding(criterion, WrongHiddenCalls) is None:
             continue
         for listing in clues.responders:
             for statement in listing.code.statements:
@@ -88,28 +73,26 @@ def _find_value_statement(name: str, clues: Clues) -> tuple[Listing, Statement] 
 
 def hint_about_functions(clues: Clues) -> Iterator[str]:
     """Yield one hint for each function that lost marks."""
-    messages = {each.id: each.message for each in clues.results}
     for criterion in clues.lost:
         if not isinstance(criterion, Functions):
             continue
-        message = messages.get(criterion.id, "")
         names = {criterion.function, *(call.function for call in criterion.calls)} - {""}
         for name in sorted(names):
-            hint = _hint_about_function_error(message, clues) or _hint_about_function(name, message, clues)
+            hint = _hint_about_function_error(criterion, clues) or _hint_about_function(name, criterion, clues)
             if hint:
                 yield hint
                 break
 
 
-def hint_about_wrong_values(name: str, message: str) -> str:
+def hint_about_wrong_values(criterion: Functions, message: str, clues: Clues) -> str:
     """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
     expected = f"{message[0].lower()}{message[1:].rstrip('.')}"
-    if _HIDDEN_CALLS not in message:
-        match = _CALL.search(message)
-        return f"The function {match[1] if match else name}: {expected}"
+    if clues.find_finding(criterion, WrongHiddenCalls) is None:
+        call = clues.find_finding(criterion, WrongReturn) or clues.find_finding(criterion, FailedCall)
+        return f"The function {criterion.function if call is None else call.function}: {expected}"
     return (
-        f"The function {name}: {expected}. Call it yourself with other arguments: 0, the largest and the smallest, "
-        "equal ones, numbers with a fraction, and those on the borders of each rule"
+        f"The function {criterion.function}: {expected}. Call it yourself with other arguments: 0, the largest and the "
+        "smallest, equal ones, numbers with a fraction, and those on the borders of each rule"
     )
 
 
@@ -163,24 +146,37 @@ def _has_exhaustive_returns(listing: Listing, else_branch: Statement) -> bool:
     return False
 
 
-def _hint_about_function_error(message: str, clues: Clues) -> str:
+def _is_shorter_list(wrong: WrongReturn) -> bool:
+    """Return whether a function returned a list with fewer values than expected."""
+    match wrong.expected, wrong.returned:
+        case [*expected], list(returned):
+            return len(returned) < len(expected)
+    return False
+
+
+def _find_call_fault(criterion: Functions, clues: Clues) -> Fault | None:
+    """Return the fault of the criterion's first call that failed, or of loading the responder."""
+    failure = clues.find_finding(criterion, FailedCall) or clues.find_finding(criterion, UnloadedResponder)
+    return None if failure is None else failure.fault
+
+
+def _hint_about_function_error(criterion: Functions, clues: Clues) -> str:
     """Return the line where a called function failed, with advice on its error; empty if unknown."""
-    match = _FAILED.search(message)
+    fault = _find_call_fault(criterion, clues)
     listing = next((each for each in clues.responders if each.part == "responder"), None)
-    if match is None or listing is None:
+    if fault is None or fault.verdict is not Verdict.RESPONDER_ERROR or fault.line is None or listing is None:
         return ""
-    line, error = int(match[2]), match[1]
-    fault = Fault(0.0, Verdict.RESPONDER_ERROR, "responder", error, line)
-    return f"{listing.locate(line)}: {describe_error(fault, clues)}"
+    return "" if fault.file else f"{listing.locate(fault.line)}: {describe_error(fault, clues)}"
 
 
-def _hint_about_function(name: str, message: str, clues: Clues) -> str:
+def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
     functions = [
         (listing, head) for listing in clues.responders for head in listing.code.list_functions() if not head.indent
     ]
     function = next(((listing, head) for listing, head in functions if head.tokens[1] == name), None)
     if function is None:
-        if _NO_FUNCTION not in message:
+        fault = _find_call_fault(criterion, clues)
+        if fault is None or not is_kind(fault, FaultKind.MISSING_FUNCTION):
             return ""
         similar_names = difflib.get_close_matches(name, [head.tokens[1] for _, head in functions], 1, _MIN_SIMILARITY)
         listing, head = next(((one, each) for one, each in functions if each.tokens[1] in similar_names), (None, None))
@@ -196,7 +192,8 @@ def _hint_about_function(name: str, message: str, clues: Clues) -> str:
             f"{listing.locate(print_statement.line)} prints the result of {name} and does not return it. Write return "
             "there"
         )
-    if not returns and _RETURNED_NOTHING.search(message):
+    wrong = clues.find_finding(criterion, WrongReturn)
+    if not returns and wrong is not None and wrong.returned is None:
         return describe_missing_return(listing, head)
     early_return = find_early_return(listing, head)
     if early_return is not None:
@@ -205,8 +202,7 @@ def _hint_about_function(name: str, message: str, clues: Clues) -> str:
             "loop. Move return below the loop: indent it less"
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
-    lists = _LISTS.search(message)
-    if stop is not None and lists and len(lists[2].split(",")) < len(lists[1].split(",")) + (lists[2] == "[]"):
+    if stop is not None and wrong is not None and _is_shorter_list(wrong):
         return (
             f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only "
             "this value, write continue in place of break"

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterator
 
+from service.grading.findings import OtherWord
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, join_tokens
 from service.grading.hint_slips import format_arguments
@@ -23,8 +24,7 @@ from submissions.criteria.texts import Says
 
 _FIRST_VALUE_NAME = re.compile(r"(?:\w+_)?(?:begin|beginning|start|first)(?:_\w+)?\Z", re.IGNORECASE)
 _AWAY = 60.0
-#: The number after which a sequence went wrong, the wrong one, and the expected one.
-_OTHER_NUMBER = re.compile(r'but after "(-?\d+)" came "(-?\d+)" instead of "(-?\d+)"')
+_INTEGER = re.compile(r"-?\d+")
 
 
 def hint_about_range_start(clues: Clues) -> Iterator[str]:
@@ -51,12 +51,11 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
 def hint_about_range_step(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``range(10, 101)``, if the required numbers have a larger step."""
     for criterion in clues.lost:
-        match = (
-            _OTHER_NUMBER.search(_join_messages(clues, criterion.id)) if isinstance(criterion, WordSequence) else None
-        )
-        if match is None:
+        word = clues.find_finding(criterion, OtherWord)
+        words = (word.previous[0], word.actual, word.expected[0]) if word and len(word.previous) == 1 else ()
+        if not words or not all(map(_INTEGER.fullmatch, words)):
             continue
-        last_number, actual, expected = map(int, match.groups())
+        last_number, actual, expected = map(int, words)
         for listing, statement in collect_statements(clues):
             call = next((one for one in statement.calls if one.name == "range"), None)
             numbers = [listing.code.number(one) for one in call.arguments] if call is not None else []
@@ -102,7 +101,7 @@ def hint_about_first_value(clues: Clues) -> Iterator[str]:
 
 def hint_about_first_message(clues: Clues) -> Iterator[str]:
     """Yield a hint on code that reads the first message of the queue, if the last is required."""
-    if not any(isinstance(each, Says) and "last text that" in _join_messages(clues, each.id) for each in clues.lost):
+    if not any(isinstance(each, Says) and each.last for each in clues.lost):
         return
     for listing, statement in collect_statements(clues):
         for index, token in enumerate(statement.tokens):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import keyword
 from collections.abc import Iterator, Sequence
 
+from service.grading.findings import ReportedFault
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
 from service.grading.hint_tables import AMOUNTS, LIMITED_MOVES, PROPERTIES, READINGS
@@ -42,7 +43,8 @@ def _collect_limit_faults(clues: Clues) -> Iterator[Fault]:
     """Yield the faults that ended trials at a limit. Time limits count only if a criterion reports them."""
     for recording in clues.recordings:
         for fault in collect_faults(recording)[:1]:
-            is_reported = any(fault.message in each.message for each in clues.results)
+            reported = (clues.find_finding(each, ReportedFault) for each in clues.lost)
+            is_reported = any(each is not None and each.fault.verdict is fault.verdict for each in reported)
             if fault.verdict is Verdict.CPU_LIMIT or (fault.verdict is Verdict.TIME_LIMIT and is_reported):
                 yield fault
 

@@ -5,9 +5,9 @@ They apply only if visible criteria lost marks.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
+from service.grading.findings import OtherTurn
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CallInCode, Statement, join_tokens
 from service.grading.hint_loops import describe_large_amount
@@ -22,7 +22,6 @@ from submissions.criteria.stopping import StopOn
 #: Criteria that fail if the robot does not stop in time.
 STOPPING_CRITERIA = (EndPose, StopOn)
 _IMMEDIATE_SECONDS = 0.5
-_TURNED = re.compile(r"robot turned (\d+(?:\.\d+)?)°")
 
 
 def hint_about_stillness(clues: Clues) -> Iterator[str]:
@@ -148,17 +147,18 @@ def hint_about_turns(clues: Clues) -> Iterator[str]:
         return
     listing, statement, call = turns[0]
     amount = listing.code.number(call.arguments[-1]) if call.arguments else None
-    for criterion, message in _collect_failure_messages(clues):
-        required_turn, turn_match = _find_required_turn(criterion), _TURNED.search(message)
-        if required_turn is None or turn_match is None or amount is None or not float(turn_match[1]):
+    for criterion in clues.lost:
+        required_turn, other_turn = _find_required_turn(criterion), clues.find_finding(criterion, OtherTurn)
+        degrees = round(other_turn.degrees, 1) if other_turn else 0.0
+        if required_turn is None or amount is None or not degrees:
             continue
         if listing.code.list_enclosing_loops(statement) and not isinstance(criterion, Drawing):
             continue
         middle = abs(sum(required_turn) / 2)
         yield (
-            f"{listing.locate(statement.line)}: the robot turned {turn_match[1]}°; expected {required_turn[0]:g} "
+            f"{listing.locate(statement.line)}: the robot turned {degrees:.1f}°; expected {required_turn[0]:g} "
             f"to {required_turn[1]:g}°. "
-            f"Change {amount:g} to about {_format_number(amount * middle / float(turn_match[1]))}"
+            f"Change {amount:g} to about {_format_number(amount * middle / degrees)}"
         )
         return
 
@@ -246,14 +246,6 @@ def _collect_turning_calls(clues: Clues) -> Iterator[tuple[Listing, Statement, C
         for call in statement.calls:
             if call.name.startswith("tank_turn.") and call.name.rpartition(".")[2] in LIMITED_MOVES:
                 yield listing, statement, call
-
-
-def _collect_failure_messages(clues: Clues) -> Iterator[tuple[Criterion, str]]:
-    """Return each criterion that lost marks, with the message of its first failure."""
-    messages_by_id = {
-        each.id: next((one.message for one in each.evidence if not one.passed), "") for each in clues.results
-    }
-    return ((each, messages_by_id.get(each.id, "")) for each in clues.lost)
 
 
 def _find_required_turn(criterion: Criterion) -> tuple[float, float] | None:

@@ -9,15 +9,15 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
+from service.grading.findings import UnnamedLabel
 from service.grading.grade import Accuracy, CriterionResult
-from service.grading.hint_clues import Clues
+from service.grading.hint_clues import Clues, find_finding
 from service.grading.hint_code import CallInCode, join_tokens
 from service.grading.judging.message_parts import quote_text
 
 _RIGHT = re.compile(r"""["']right["']|\bright(?:_\w*)?im(?:g|age)\w*|\bright_\w+""")
 _LEFT = re.compile(r"""["']left["']|\bleft(?:_\w*)?im(?:g|age)\w*|\bleft_\w+""")
 _DIVISION = re.compile(r"/\s*\(?\s*(?:max|255|\w+\.max|np\.|\w+)")
-_NO_LABEL = re.compile(r"the answer names no label: (\"[^\"]{0,80}\")")
 _PREDICT_CALL = re.compile(r"\.predict\w*\(|class_predict")
 _MAX_ACCURACY = 0.5
 
@@ -161,8 +161,9 @@ def _hint_about_constant_answer(answers: Mapping[str, str], accuracy: Accuracy, 
 
 def _hint_about_unknown_label(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:
     """Return a hint on an answer that is not a valid name."""
-    match = next((_NO_LABEL.search(each.message) for each in result.evidence if not each.passed), None)
-    if match is None or not accuracy.labels:
+    unnamed = find_finding(result, UnnamedLabel)
+    if unnamed is None or not accuracy.labels:
         return ""
     names = ", ".join(quote_text(label) for label in accuracy.labels[:3])
-    return f"{_describe_prediction_line(clues)}: the answer is {match[1]}; expected one of the names, as {names}"
+    answer = quote_text(unnamed.answer)
+    return f"{_describe_prediction_line(clues)}: the answer is {answer}; expected one of the names, as {names}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from service.grading.findings import OtherWord, StrayItems
 from service.grading.hint_clues import Clues
 from service.grading.hint_code import LOOPS, Statement, join_tokens
 from service.grading.hint_slips import format_arguments
@@ -20,9 +21,7 @@ from submissions.criteria.motion import Encounters
 from submissions.criteria.sequence import WordSequence
 
 _OUTPUT_FUNCTIONS = frozenset({"say", "print"})
-_REPEATED_WORDS = re.compile(r"these words (\d+) more times")
-#: The last correct number and the missing one.
-_ENDED_EARLY = re.compile(r'after "(-?\d+)" came (?:nothing|"[^\W\d]+") instead of "(-?\d+)"')
+_INTEGER = re.compile(r"-?\d+")
 _INCLUSIVE = {"<": "<=", ">": ">="}
 
 
@@ -50,8 +49,9 @@ def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
 
 def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on a loop that repeats its output because it is nested in an unrelated loop."""
-    match = next((found for each in clues.results if (found := _REPEATED_WORDS.search(each.message))), None)
-    if match is None:
+    sequences = (each for each in clues.lost if isinstance(each, WordSequence))
+    repeated_words = next((found for each in sequences if (found := clues.find_finding(each, StrayItems))), None)
+    if repeated_words is None:
         return
     for listing, statement in collect_statements(clues):
         outer_loop = listing.code.statements[statement.parent] if statement.parent >= 0 else None
@@ -64,8 +64,8 @@ def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
         ):
             yield (
                 f"{listing.locate(statement.line)}: this loop is inside the loop in line {outer_loop.line}, so it "
-                f"repeats its words in each pass of that loop. Words that are expected once appeared {match[1]} more "
-                "times. To run this loop once, after the other loop, indent it less"
+                f"repeats its words in each pass of that loop. Words that are expected once appeared "
+                f"{repeated_words.count} more times. To run this loop once, after the other loop, indent it less"
             )
             return
 
@@ -73,11 +73,10 @@ def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
 def hint_about_last_number(clues: Clues) -> Iterator[str]:
     """Yield a hint on a count that ends one too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
     for criterion in clues.lost:
-        result = next((each for each in clues.results if each.id == criterion.id), None)
-        match = _ENDED_EARLY.search(result.message) if isinstance(criterion, WordSequence) and result else None
-        if match is None or not isinstance(criterion, WordSequence):
+        numbers = _find_last_numbers(clues.find_finding(criterion, OtherWord))
+        if numbers is None or not isinstance(criterion, WordSequence):
             continue
-        last_number, missing_number = int(match[1]), int(match[2])
+        last_number, missing_number = numbers
         for listing, statement in collect_statements(clues):
             condition = statement.condition if statement.keyword == "while" else ()
             if (
@@ -113,6 +112,14 @@ def hint_about_last_number(clues: Clues) -> Iterator[str]:
                 f"{missing_number}. Write range({format_arguments(fixed_arguments)})"
             )
             return
+
+
+def _find_last_numbers(word: OtherWord | None) -> tuple[int, int] | None:
+    """Return the last correct number and the missing one, if no other number came in its place."""
+    if word is None or len(word.previous) != 1 or (word.actual and not word.actual.isalpha()):
+        return None
+    is_count = _INTEGER.fullmatch(word.previous[0]) and _INTEGER.fullmatch(word.expected[0])
+    return (int(word.previous[0]), int(word.expected[0])) if is_count else None
 
 
 def hint_about_exact_reading(clues: Clues) -> Iterator[str]:

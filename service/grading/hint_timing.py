@@ -8,23 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from service.grading.findings import HurriedSpeech, LateResend
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement
 from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import collect_statements
 from service.grading.hint_tables import PROPERTIES
-from submissions.criteria.sequence import WordSequence
-from submissions.criteria.unreliable_channel import Resends
 
-_SPEAKING = "still speaking"
-_TOO_EARLY = "after its answer had come"
 _RARE_READING_SECONDS = 0.5
 
 
 def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say`` without ``wait=True``, if the text must be spoken to its end."""
-    if not any(_SPEAKING in each.message for each in clues.results) or not _has_lost_criterion(clues, WordSequence):
+    if not any(clues.find_finding(each, HurriedSpeech) for each in clues.lost):
         return
     for listing, statement in collect_statements(clues):
         for call in statement.calls:
@@ -39,7 +36,7 @@ def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
 
 def hint_about_short_waits(clues: Clues) -> Iterator[str]:
     """Yield a hint on a wait for an answer that is shorter than the answer takes."""
-    if not _has_lost_criterion(clues, Resends) or not any(_TOO_EARLY in each.message for each in clues.results):
+    if not any(clues.find_finding(each, LateResend) for each in clues.lost):
         return
     answer_seconds = _measure_fastest_answer(clues)
     for listing, statement in collect_statements(clues):

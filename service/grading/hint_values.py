@@ -5,15 +5,16 @@ The program text shows each of them. They apply only if visible criteria lost ma
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
+from service.grading.findings import MissingSwitches, OtherReading
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements
 from service.grading.hint_tables import PROPERTIES
-from submissions.criteria.code import SourceRules
 from submissions.criteria.collecting import Collects
 from submissions.criteria.logs import Datalog
 from submissions.criteria.stopping import StopOn
@@ -21,12 +22,8 @@ from submissions.criteria.stopping import StopOn
 _OPERATORS = frozenset("+-*/")
 _PAIRS = frozenset({"MoveTank", "MoveSteering"})
 _SWAPPED_PORTS = ("OUTPUT_C", ",", "OUTPUT_B")
-_MISSING_FLAG = re.compile(r"to have -(\w), but")
 #: A flag that takes a value, and the value after it.
 _VALUED_FLAG = re.compile(r"(?<=\s)-(\w*?)([broxyaPNMs])([A-Za-z]{2,})(?=\s|$)")
-_TOO_FEW_SAMPLES = re.compile(r"[Ee]xpected at least (\d+) samples of \w+, but there (?:is|are) (\d+)")
-_USABLE_PAIRS = re.compile(r"\d+ of (\d+) pairs are usable")
-_READING = re.compile(r"reading (\S+) to (\S+) %, but the sensor was reading (\d+(?:\.\d+)?) %")
 _X_NAME = re.compile(r"(?:\w*_)?d?x\d?\Z", re.IGNORECASE)
 _Y_NAME = re.compile(r"(?:\w*_)?d?y\d?\Z", re.IGNORECASE)
 
@@ -72,10 +69,8 @@ def hint_about_swapped_ports(clues: Clues) -> Iterator[str]:
 
 def hint_about_swallowed_flags(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``-oAHWR``: the flag takes a value, so the flags after it become its value."""
-    messages = [
-        each.message for each in clues.results for one in clues.lost if one.id == each.id and _is_source_rule(one)
-    ]
-    missing_flags = {flag for message in messages for flag in _MISSING_FLAG.findall(message)}
+    missing_switches = (found for each in clues.lost if (found := clues.find_finding(each, MissingSwitches)))
+    missing_flags = {letter for each in missing_switches for letter in each.letters}
     for listing in clues.programs if missing_flags else ():
         magic_index = listing.magic_place
         match = _VALUED_FLAG.search(listing.lines[magic_index]) if magic_index is not None else None
@@ -95,20 +90,15 @@ def hint_about_swallowed_flags(clues: Clues) -> Iterator[str]:
         return
 
 
-def _is_source_rule(criterion: object) -> bool:
-    return isinstance(criterion, SourceRules)
-
-
 def hint_about_few_samples(clues: Clues) -> Iterator[str]:
     """Yield a hint on a log with too few samples, which may explain its other errors."""
     # A robot that stopped too early could not log enough.
     has_stopping_criterion = any(isinstance(each, StopOn) for each in clues.lost)
     for criterion in () if has_stopping_criterion else clues.lost:
-        message = next((each.message for each in clues.results if each.id == criterion.id), "")
-        match = _TOO_FEW_SAMPLES.search(message) if isinstance(criterion, Datalog) else None
-        if match is None or match[2] == "0":
+        count = clues.find_measures(criterion).get("samples") if isinstance(criterion, Datalog) else None
+        if not count or not isinstance(criterion, Datalog) or not count < criterion.at_least:
             continue
-        sentence = f"only {match[2]} samples were logged, and at least {match[1]} are asked for"
+        sentence = f"only {count:g} samples were logged, and at least {criterion.at_least} are asked for"
         sleeping_loops = _collect_sleeping_loops(clues)
         if len(sleeping_loops) == 1:
             listing, statement, seconds = sleeping_loops[0]
@@ -138,19 +128,20 @@ def _collect_sleeping_loops(clues: Clues) -> list[tuple[Listing, Statement, floa
 def hint_about_few_images(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that is too fast to take enough images of its patterns."""
     for criterion in clues.lost:
-        message = next((each.message for each in clues.results if each.id == criterion.id), "")
-        match = _USABLE_PAIRS.search(message) if isinstance(criterion, Collects) else None
+        measures = clues.find_measures(criterion)
+        class_counts = [count for name, count in measures.items() if name.startswith("different: ")]
+        has_few_images = isinstance(criterion, Collects) and min(class_counts, default=math.inf) < criterion.each
         drive_statements = [
             (listing, each)
             for listing, each in collect_statements(clues)
             if any(call.name.endswith(".on") and call.arguments for call in each.calls)
         ]
-        if match is None or len(drive_statements) != 1 or clues.seconds > clues.limit / 4:
+        if not has_few_images or not measures["pairs"] or len(drive_statements) != 1 or clues.seconds > clues.limit / 4:
             continue
         listing, statement = drive_statements[0]
         yield (
             f"{listing.locate(statement.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
-            f"{match[1]} pairs of images. Drive slower, or take images more often"
+            f"{measures['pairs']:g} pairs of images. Drive slower, or take images more often"
         )
         return
 
@@ -158,9 +149,11 @@ def hint_about_few_images(clues: Clues) -> Iterator[str]:
 def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that stops when only the edge of its sensor is on the target."""
     for criterion in clues.lost:
-        message = next((each.message for each in clues.results if each.id == criterion.id), "")
-        match = _READING.search(message) if isinstance(criterion, StopOn) else None
-        if match is None or not float(match[2]) < float(match[3]) < 100:
+        other_reading = clues.find_finding(criterion, OtherReading)
+        if other_reading is None or not isinstance(criterion, StopOn) or criterion.reflected is None:
+            continue
+        minimum, maximum = criterion.reflected
+        if minimum == maximum or not maximum < other_reading.reading < 100:
             continue
         loops = [
             (listing, each)
@@ -171,8 +164,8 @@ def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
             listing, statement = loops[0]
             yield (
                 f"{listing.locate(statement.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
-                f"it read {match[3]} %, expected {match[1]} to {match[2]} %. Let the robot drive on a little after the "
-                "loop, for example with time.sleep(0.2)"
+                f"it read {other_reading.reading:.2f} %, expected {minimum:g} to {maximum:g} %. Let the robot drive on "
+                "a little after the loop, for example with time.sleep(0.2)"
             )
             return
 

@@ -21,7 +21,7 @@ from submissions.criteria.common import (
     Texts,
     UnmetRequirement,
 )
-from submissions.magics import Flags, parse_magic
+from submissions.magics import Flags, parse_flags
 from submissions.strict_table import StrictTable
 
 #: Words that denote a construct. Other entries are names.
@@ -83,7 +83,7 @@ class SourceRules(Criterion):
         try:
             parse_flag_texts(value)
         except UsageError as error:
-            raise ValueError(f"cannot be read: {str(error).removeprefix('line 1: ')}") from None
+            raise ValueError(f"cannot be read: {error}") from None
         return value
 
     @field_validator("in_loop")
@@ -239,7 +239,7 @@ def parse_flag_texts(texts: Texts) -> Flags:
     Raises:
         UsageError: A flag does not exist.
     """
-    return parse_magic("%%sim_magic_preloaded " + " ".join(texts))
+    return parse_flags("sim_magic_preloaded", " ".join(texts))
 
 
 def _find_missing_part(key: str, part: str, context: AssignmentContext) -> Iterator[UnmetRequirement]:

@@ -20,26 +20,15 @@ _PARTS = {"endswith", "find", "partition", "removeprefix", "removesuffix", "rpar
 _PATTERNS = {"findall", "finditer", "fullmatch", "match", "search"}
 
 _OF_PYTHON = "reads, for all hints, the sentences of Python, which has no codes for mistakes"
-_OF_CRITERIA = "a hint reads what the criterion's message says; results of criteria have no state of their own yet"
-_OF_REPORTS = "finds the hint, the fault and the evidence that say the same, so as to say it once"
+_OF_REPORTS = "finds the hint, the fault and the evidence that say the same; stored grades have only their sentences"
 #: For each file, the number of such places and the reason.
 _ALLOWED: dict[str, tuple[int, str]] = {
     "responders/faults.py": (1, "reads, in one place, the sentence of a stored fault that it makes itself"),
     "responders/notebook_executor.py": (1, "a fault names the function that is missing in its sentence alone"),
     "responders/sandbox/inside/name_suggestions.py": (2, "ImportError of Python's has no code for what is missing"),
-    "responders/sandbox/inside/responder_role.py": (1, "no text: message is a frame"),
     "service/commands/grading.py": (1, "leaves out of a row's reason the file's name, which the row has"),
     "service/grading/fault_kinds.py": (1, _OF_PYTHON),
-    "service/grading/hint_answers.py": (2, _OF_CRITERIA),
-    "service/grading/hint_cause_lines.py": (4, _OF_CRITERIA),
-    "service/grading/hint_formulas.py": (1, _OF_CRITERIA),
-    "service/grading/hint_functions.py": (9, _OF_CRITERIA),
-    "service/grading/hint_loops.py": (1, _OF_REPORTS),
-    "service/grading/hint_motion.py": (1, _OF_CRITERIA),
-    "service/grading/hint_recognition.py": (1, _OF_CRITERIA),
-    "service/grading/hint_repetition.py": (2, _OF_CRITERIA),
-    "service/grading/hint_timing.py": (2, _OF_CRITERIA),
-    "service/grading/hint_values.py": (4, _OF_CRITERIA),
+    "service/grading/hint_cause_lines.py": (1, "finds which of the program's own texts a message quotes"),
     "service/reports/diagnosis.py": (8, _OF_REPORTS),
     "service/reports/html.py": (
         1,
@@ -51,8 +40,6 @@ _ALLOWED: dict[str, tuple[int, str]] = {
         1,
         "pydantic has no key for an error about a whole table",
     ),
-    "submissions/bundle.py": (1, "whether a sentence names the file already, so that it is named once"),
-    "submissions/criteria/code.py": (1, "leaves out the line's number, which a single line does not need"),
 }
 
 

@@ -72,21 +72,21 @@ class ResponderRole:
 
     def _serve_messages(self) -> None:
         while True:
-            message = self._wire.receive()
-            if message["do"] == "call":
-                self._wire.send(call_results.call_function(self._namespace, self._files, message))
+            frame = self._wire.receive()
+            if frame["do"] == "call":
+                self._wire.send(call_results.call_function(self._namespace, self._files, frame))
             else:
-                self._answer_message(message, 0)
+                self._answer_message(frame, 0)
 
-    def _answer_message(self, message: Frame, start: int) -> None:
-        """Answer one message of the run that began at ``start``. The message contains the robot's new log entries."""
+    def _answer_message(self, frame: Frame, start: int) -> None:
+        """Answer one message of the run that began at ``start``. Its frame contains the robot's new log entries."""
         from nbev3devsim.load_nbev3devwidget import roboSim
 
-        self._units = max(self._units, start + message["t"])
-        roboSim.collect(message.get("data", []), message.get("images", []))
-        if "sender" in message and not self._defines_sender:
-            self._namespace["sender"] = message["sender"]
-        self._wire.send(self._answer_text(message["text"]))
+        self._units = max(self._units, start + frame["t"])
+        roboSim.collect(frame.get("data", []), frame.get("images", []))
+        if "sender" in frame and not self._defines_sender:
+            self._namespace["sender"] = frame["sender"]
+        self._wire.send(self._answer_text(frame["text"]))
 
     def _load_module(self, text: str) -> Frame | None:
         """Run the module. Return its error, also if it has no responder, or None."""

@@ -12,6 +12,14 @@ from fractions import Fraction
 from typing import Any
 
 from responders.function_calls import CallResult, CallResults, FunctionCall, describe_missing_function
+from service.grading.findings import (
+    FailedCall,
+    Finding,
+    MissingSwitches,
+    UnloadedResponder,
+    WrongHiddenCalls,
+    WrongReturn,
+)
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
 from service.grading.judging.judge_declaration import Case, declare_case_judge, judge_by_trial, judge_once
@@ -88,7 +96,9 @@ def judge_source(
         return pass_with(f"The code of {part_name} is as expected.", for_staff=for_staff)
     count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(missing_flags)
     message = f"{'. '.join(problems[:_MAX_LISTED])}."
-    return fail_with(message, score=Fraction(count - len(problems), count), for_staff=for_staff)
+    score = Fraction(count - len(problems), count)
+    letters = tuple(flag[1:] for flag in missing_flags if len(flag) == 2)
+    return fail_with(message, score=score, for_staff=for_staff, findings=(MissingSwitches(letters),) if letters else ())
 
 
 def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
@@ -145,25 +155,34 @@ def _judge_calls(criterion: Functions, results: CallResults | None) -> Outcome:
     if results is None:
         return fail_with("Expected a responder to be submitted, but it was not.")
     if results.fault is not None:
-        return fail_with(f"Expected the responder to be loaded, but: {describe_fault(results.fault)}.")
+        return fail_with(
+            f"Expected the responder to be loaded, but: {describe_fault(results.fault)}.",
+            findings=(UnloadedResponder(results.fault),),
+        )
     scores: list[Fraction] = []
     first_problem = for_staff = ""
+    findings: tuple[Finding, ...] = ()
     min_score = Fraction(str(criterion.at_least)) if criterion.each else Fraction(1)
     for call, call_result in zip(criterion.calls, results.returned, strict=True):
-        score, description = _compare_call(criterion, call, call_result)
+        score, description, value = _compare_call(criterion, call, call_result)
         scores.append(score)
         if score < min_score:
             problem = f"Expected {_format_call(criterion, call)} to return {_format_expected(call)}, but {description}"
             if call.hidden:
                 for_staff = for_staff or f"The first hidden call with a wrong result: {problem}."
-            else:
-                first_problem = first_problem or problem
-    return _combine_call_scores(
-        criterion, scores, first_problem or _describe_hidden_failures(criterion, results, scores, min_score), for_staff
-    )
+            elif not first_problem:
+                name, first_problem = call.function or criterion.function, problem
+                expected = None if call.one_of else call.returns
+                is_failed = value is MISSING
+                findings = (FailedCall(name, call_result.fault) if is_failed else WrongReturn(name, expected, value),)
+    if not first_problem and any(score < min_score for score in scores):
+        first_problem, findings = _describe_hidden_failures(criterion, results, scores, min_score)
+    return _combine_call_scores(criterion, scores, first_problem, for_staff, findings)
 
 
-def _combine_call_scores(criterion: Functions, scores: Sequence[Fraction], problem: str, for_staff: str) -> Outcome:
+def _combine_call_scores(
+    criterion: Functions, scores: Sequence[Fraction], problem: str, for_staff: str, findings: tuple[Finding, ...]
+) -> Outcome:
     """Return the outcome of the calls. ``problem`` describes the first problem, if any."""
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
@@ -176,32 +195,29 @@ def _combine_call_scores(criterion: Functions, scores: Sequence[Fraction], probl
     right_count = sum(score == 1 for score in scores)
     tally = f" ({right_count} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
     score = round_to_steps(share) if criterion.table else share
-    return fail_with(f"{problem}{tally}.", score=score, measures=measures, for_staff=for_staff)
+    return fail_with(f"{problem}{tally}.", score=score, measures=measures, for_staff=for_staff, findings=findings)
 
 
 def _describe_hidden_failures(
     criterion: Functions, results: CallResults, scores: Sequence[Fraction], min_score: Fraction
-) -> str:
+) -> tuple[str, tuple[Finding, ...]]:
     """Return the message if only hidden calls failed, without values or errors, which a program can choose."""
     calls = criterion.calls
-    if not any(score < min_score for score in scores):
-        return ""
-    faults = [gave.fault.message if gave.fault is not None else "" for gave in results.returned]
-    if all(
-        fault == describe_missing_function(call.function or criterion.function)
-        for call, fault in zip(calls, faults, strict=True)
-    ):
-        return f"Expected all functions to exist, but {faults[0]}"
+    faults = [gave.fault for gave in results.returned if gave.fault is not None]
+    if [fault.message for fault in faults] == [
+        describe_missing_function(call.function or criterion.function) for call in calls
+    ]:
+        return f"Expected all functions to exist, but {faults[0].message}", (UnloadedResponder(faults[0]),)
     hidden_scores = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
     if criterion.table:
         share = round_to_steps(sum(scores, Fraction(0)) / len(scores))
         expectation = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
-        return f"{expectation}, but it was correct in about {float(share):.0%}"
+        return f"{expectation}, but it was correct in about {float(share):.0%}", ()
     right_count = sum(score >= min_score for score in hidden_scores)
     return (
         f"Expected the right values in all {len(hidden_scores)} hidden calls as well, but {right_count} of them were "
         "right"
-    )
+    ), (WrongHiddenCalls(),)
 
 
 def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outcome:
@@ -233,20 +249,21 @@ def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outc
     return fail_with(message, score=Fraction(str(score)), measures=kept_measures)
 
 
-def _compare_call(criterion: Functions, call: ExpectedCall, call_result: CallResult) -> tuple[Fraction, str]:
-    """Return the correct fraction of a call, and a description of what happened."""
+def _compare_call(criterion: Functions, call: ExpectedCall, call_result: CallResult) -> tuple[Fraction, str, Any]:
+    """Return the correct fraction of a call, a description of what happened, and the compared value or MISSING."""
     if call_result.fault is not None:
-        return Fraction(0), f"it did not: {describe_fault(call_result.fault)}"
+        return Fraction(0), f"it did not: {describe_fault(call_result.fault)}", MISSING
     value = call_result.value
     if criterion.path is not None:
         value = find_at_path(parse_json_answer(value), criterion.path) if isinstance(value, str) else MISSING
         if value is MISSING:
-            return Fraction(0), f"there is nothing at {criterion.path} in {quote_text(as_text(call_result.value))}"
+            description = f"there is nothing at {criterion.path} in {quote_text(as_text(call_result.value))}"
+            return Fraction(0), description, MISSING
     description = f"it returned {_format_value(value)}"
     if criterion.each:
-        return _compute_correct_share(criterion, call.returns, value), description
+        return _compute_correct_share(criterion, call.returns, value), description, value
     allowed_values = call.one_of or (call.returns,)
-    return Fraction(any(_is_close_value(criterion, value, each) for each in allowed_values)), description
+    return Fraction(any(_is_close_value(criterion, value, each) for each in allowed_values)), description, value
 
 
 def _compute_correct_share(criterion: Functions, expected_values: Sequence[Any], value: Any) -> Fraction:

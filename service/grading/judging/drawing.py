@@ -13,6 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from service.grading.findings import OtherTurn
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_pen_mask,
@@ -123,7 +124,8 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
         )
     problem = next((problem for problem in problems if problem is not None), None)
     if problem is not None:
-        return fail_with(problem.words, *find_place(recording, problem.row), score=score, measures=measures)
+        moment = find_place(recording, problem.row)
+        return fail_with(problem.words, *moment, score=score, measures=measures, findings=problem.findings)
     means = [_compute_mean_length(figure) for figure in figures]
     if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
         number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
@@ -160,6 +162,7 @@ class _Problem:
 
     words: str
     row: int
+    findings: tuple[OtherTurn, ...] = ()
 
 
 def _describe_figures(criterion: Drawing) -> str:
@@ -197,6 +200,7 @@ def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Pr
                 f"Expected a turn of {required_angle:g}° (within {criterion.angle_within:g}°) after each leg, "
                 f"but after leg {leg_number}{figure_clause} the robot turned {angle:.1f}°.",
                 following.first,
+                (OtherTurn(angle),),
             )
     if criterion.closes:
         gap = math.dist(figure[0].start, figure[-1].end)

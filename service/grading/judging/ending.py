@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from service.grading.findings import ReportedFault
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import measure_area_distance
 from service.grading.judging.judge_declaration import declare_judge
@@ -28,7 +29,8 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     measures = (Measure("time", recording.end_t, "s"),)
     if fault is not None:
         message = f"Expected the program to end by itself, but {_describe_end(fault)}."
-        return replace(fail_with(message, fault.t, recording.end, measures=measures), has_end_reason=True)
+        outcome = fail_with(message, fault.t, recording.end, measures=measures, findings=(ReportedFault(fault),))
+        return replace(outcome, has_end_reason=True)
     if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:
         return fail_with(
             f"Expected the program to end within {criterion.seconds:g} s, but it took {recording.end_t:.2f} s.",

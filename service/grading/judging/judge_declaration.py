@@ -131,6 +131,9 @@ def judge_by_trial(
             for (index, _), outcome in zip(trials, outcomes, strict=True)
         ),
         shown=_build_visible_feedback(trials, outcomes, summarise),
+        findings={
+            index: outcome.findings for (index, _), outcome in zip(trials, outcomes, strict=True) if outcome.findings
+        },
     )
 
 
@@ -145,6 +148,7 @@ def judge_once(criterion: Criterion, outcome: Outcome) -> CriterionResult:
         message=outcome.message,
         visibility=criterion.visibility,
         for_staff=outcome.for_staff,
+        findings={None: outcome.findings} if outcome.findings else {},
     )
 
 

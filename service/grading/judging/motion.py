@@ -12,6 +12,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from service.grading.findings import OtherMove, OtherTurn
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_positions,
@@ -112,6 +113,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
             *find_place(recording, extra_moves[0].first),
             score=score,
             measures=measures,
+            findings=(OtherMove(extra_moves[0].seconds),),
         )
     description = "; ".join(str(move) for move in matched_moves[:4] if move is not None)
     return pass_with(
@@ -304,6 +306,7 @@ def _fail_for_missing_move(
             recording.end,
             score,
             measures,
+            findings=(OtherMove(moves[-1].seconds),) if moves else (),
         )
     closest_move = (
         min(free_moves, key=lambda move: _count_missed_conditions(required_move, move))
@@ -315,6 +318,7 @@ def _fail_for_missing_move(
         *find_place(recording, closest_move.last),
         score=score,
         measures=measures or build_move_measures(closest_move, "this move"),
+        findings=(OtherMove(closest_move.seconds), OtherTurn(abs(closest_move.turn))),
     )
 
 

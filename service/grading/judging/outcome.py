@@ -11,6 +11,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 from typing import Literal
 
+from service.grading.findings import Finding
 from service.grading.grade import Measure
 from sim.recording import Fault, Pose, Recording, Verdict
 
@@ -33,6 +34,7 @@ class Outcome:
     measures: tuple[Measure, ...] = ()
     for_staff: str = ""  # what staff should check; not shown to students
     has_end_reason: bool = False  # the message already says why the run ended early
+    findings: tuple[Finding, ...] = ()
 
 
 def pass_with(
@@ -53,9 +55,11 @@ def fail_with(
     score: Fraction = Fraction(0),
     measures: tuple[Measure, ...] = (),
     for_staff: str = "",
+    findings: tuple[Finding, ...] = (),
 ) -> Outcome:
     """Return a failed outcome. ``score`` is kept below 1, because all may be present but in the wrong order."""
-    return Outcome(False, min(max(score, Fraction(0)), _MAX_FAILED_SCORE), message, t, pose, measures, for_staff)
+    failed_score = min(max(score, Fraction(0)), _MAX_FAILED_SCORE)
+    return Outcome(False, failed_score, message, t, pose, measures, for_staff, findings=findings)
 
 
 def find_ending_fault(recording: Recording) -> Fault | None:

@@ -30,6 +30,7 @@ class Sample:
     answer: str | None
     words: str  # a description, for a sentence
     confidence: float | None = None
+    unnamed: str | None = None  # the answer, if it names no label
 
     @property
     def is_correct(self) -> bool:
@@ -99,7 +100,7 @@ def _choose_majority(group: Sequence[Sample]) -> Sample:
     leaders = tuple(str(answer) for answer, count in counts if count == top_count)
     if len(leaders) > 1:
         description = f"{quote_list(leaders)} were answered equally often for its {len(group)} images"
-        return replace(group[0], answer=None, words=description)
+        return replace(group[0], answer=None, words=description, unnamed=None)
     majority_sample = next(sample for sample in group if sample.answer == leaders[0])
     return replace(
         majority_sample, words=f"it was identified as {quote_list(leaders)} {top_count} times in {len(group)} images"

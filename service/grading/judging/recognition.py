@@ -16,6 +16,7 @@ from typing import Literal
 
 from models.intervals import compute_wilson_interval
 from responders.faults import is_wrong_return
+from service.grading.findings import Finding, UnnamedLabel
 from service.grading.grade import (
     Accuracy,
     AccuracyCurve,
@@ -115,6 +116,7 @@ class ClassificationResult:
     accuracy: Accuracy
     predictions: tuple[Prediction, ...]
     evidence: tuple[Evidence, ...]
+    findings: Mapping[int | None, tuple[Finding, ...]]
 
     @property
     def correct_count(self) -> int:
@@ -139,9 +141,11 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         duplicates += sum(reply.duplicates for reply in replies)
         trial_images = []
         for number, truth in truths_by_trial[index]:
-            answer, description, confidence = _read_answer(criterion, replies[number], finder)
+            answer, description, confidence, unnamed = _read_answer(criterion, replies[number], finder)
             image = recording.images[number]
-            trial_images.append(Sample(index, image, finder.to_canonical(truth), answer, description, confidence))
+            trial_images.append(
+                Sample(index, image, finder.to_canonical(truth), answer, description, confidence, unnamed)
+            )
         images += trial_images
         samples += _collect_counted_samples(criterion, index, trial, trial_images, finder)
     trials_by_index = dict(trials)
@@ -170,6 +174,11 @@ def classify(criterion: Recognition, assignment: Assignment, trials: IndexedTria
         _compute_accuracy(samples, labels, counts),
         predictions,
         tuple(_build_evidence(index, own) for index, own in samples_by_trial.items()),
+        {
+            index: (UnnamedLabel(example.unnamed),)
+            for index, own in samples_by_trial.items()
+            if (example := _choose_example(own)).unnamed is not None
+        },
     )
 
 
@@ -210,6 +219,7 @@ def build_recognition_result(
         accuracy=classification.accuracy,
         predictions=classification.predictions,
         curves=curves,
+        findings=classification.findings,
     )
 
 
@@ -295,8 +305,7 @@ def _compute_confidence(samples: Sequence[Sample]) -> Confidence | None:
 
 
 def _build_evidence(index: int, samples: Sequence[Sample]) -> Evidence:
-    """Return the first image of the trial that was misidentified, otherwise its last."""
-    example = next((sample for sample in samples if not sample.is_correct), samples[-1])
+    example = _choose_example(samples)
     image = example.image
     return Evidence(
         trial=index,
@@ -305,6 +314,11 @@ def _build_evidence(index: int, samples: Sequence[Sample]) -> Evidence:
         t=image.t if image else None,
         pose=image.pose if image else None,
     )
+
+
+def _choose_example(samples: Sequence[Sample]) -> Sample:
+    """Return the first image of a trial that was misidentified, otherwise its last."""
+    return next((sample for sample in samples if not sample.is_correct), samples[-1])
 
 
 def _collect_replies(criterion: Recognition, recording: Recording) -> list[Reply]:
@@ -322,12 +336,17 @@ def _collect_replies(criterion: Recognition, recording: Recording) -> list[Reply
     return replies
 
 
-def _read_answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> tuple[str | None, str, float | None]:
-    """Return the label in the answer (None unless there is exactly one), a description, and the confidence."""
+def _read_answer(
+    criterion: Recognition, reply: Reply, finder: LabelFinder
+) -> tuple[str | None, str, float | None, str | None]:
+    """Return the label in the answer (None unless there is exactly one), a description, and the confidence.
+
+    The fourth value is the answer if it names no label.
+    """
     if reply.text is None:
-        return None, reply.words, None
+        return None, reply.words, None, None
     if reply.status == "late" and criterion.late == "wrong":
-        return None, f"the answer came too late: {quote_text(reply.text)}", None
+        return None, f"the answer came too late: {quote_text(reply.text)}", None, None
     text, confidence = reply.text, None
     if criterion.answer_from == "reply":
         value = parse_json_answer(text)
@@ -338,10 +357,11 @@ def _read_answer(criterion: Recognition, reply: Reply, finder: LabelFinder) -> t
             text = text if answer_value is MISSING else as_text(answer_value)
     found_labels = finder.find_labels(text)
     if not found_labels:
-        return None, f"the answer names no label: {quote_text(text)}", confidence
+        return None, f"the answer names no label: {quote_text(text)}", confidence, text
     if len(found_labels) > 1:
-        return None, f"the answer names more than one label: {' and '.join(map(quote_text, found_labels))}", confidence
-    return found_labels[0], f"it was identified as {quote_text(found_labels[0])}", confidence
+        description = f"the answer names more than one label: {' and '.join(map(quote_text, found_labels))}"
+        return None, description, confidence, None
+    return found_labels[0], f"it was identified as {quote_text(found_labels[0])}", confidence, None
 
 
 def _parse_probability(value: object) -> float | None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from responders.message_format import JSON
+from service.grading.findings import OtherAnswer
 from service.grading.grade import TrialResult
 from service.grading.judging.agent_pairs import VALUE, AgentPair, build_pair
 from service.grading.judging.answers import (
@@ -76,13 +77,13 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     if excused_count and not count:
         return pass_with(_NOTHING_TO_ANSWER)
     answers = Answers(recording)
-    wrong_answers: list[tuple[Message, str]] = []
+    wrong_answers: list[tuple[Message, str, int]] = []
     for attempts in questions.values():
-        mistakes = ((message, _describe_mistake(criterion, answers, index)) for index, message in attempts)
-        wrong_answers += itertools.islice(((message, mistake) for message, mistake in mistakes if mistake), 1)
+        mistakes = ((message, _describe_mistake(criterion, answers, index), index) for index, message in attempts)
+        wrong_answers += itertools.islice((each for each in mistakes if each[1]), 1)
     if not wrong_answers:
         return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
-    message, mistake = min(wrong_answers, key=lambda pair: pair[0].t)
+    message, mistake, index = min(wrong_answers, key=lambda each: each[0].t)
     right_count = count - len(wrong_answers)
     return fail_with(
         f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
@@ -90,6 +91,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
         message.t,
         get_pose_at(recording, message.t),
         Fraction(right_count, count),
+        findings=_find_value(criterion, answers, index),
     )
 
 
@@ -126,12 +128,13 @@ def _judge_expected(
                 right_count += 1
                 count += 1
                 continue
-            message = matching_messages[wrong_index][1]
+            index, message = matching_messages[wrong_index]
             outcome = fail_with(
                 f"Expected {pair.receiver_name} to answer {quote_text(text)} with {expected_answer}, but "
                 f"{mistakes[wrong_index]}.",
                 message.t,
                 get_pose_at(pair.recording, message.t),
+                findings=_find_value(criterion, answers, index),
             )
         first_failure = first_failure or outcome
         count += 1
@@ -144,6 +147,7 @@ def _judge_expected(
         first_failure.t,
         first_failure.pose,
         Fraction(right_count, count),
+        findings=first_failure.findings,
     )
 
 
@@ -229,6 +233,15 @@ def _describe_mistake(criterion: Replies, answers: Answers, index: int) -> str:
             return f"it has {quote_text(as_text(actual))} at {criterion.path}"
         text = as_text(actual)
     return "" if is_accepted_text(criterion, text) else f"it answered {quote_text(text)}"
+
+
+def _find_value(criterion: Replies, answers: Answers, index: int) -> tuple[OtherAnswer, ...]:
+    """Return the value at the criterion's path of the answer to the message at ``index``, if it has one."""
+    reply = answers.find_answer(index)
+    if reply is None or criterion.path is None:
+        return ()
+    value = find_at_path(parse_json_answer(reply.text), criterion.path)
+    return () if value is MISSING else (OtherAnswer(as_text(value)),)
 
 
 def _is_question(criterion: Replies, text: str) -> bool:

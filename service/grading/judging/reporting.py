@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from service.grading.findings import MissingEntry
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import describe_zone, is_in_zone, locate_part, locate_part_at_time
 from service.grading.judging.judge_declaration import declare_judge
@@ -73,6 +74,7 @@ def _judge_report(
             f"{expectation}, but {missing_entry} did not come{position_clause}{guess_clause}: {report_text}.",
             score=Fraction(0 if is_guess else match.count, len(answer_row)),
             measures=measures,
+            findings=(_build_missing_entry(answer_row, match.count, texts),),
         )
     if is_guess:
         return fail_with(
@@ -80,6 +82,11 @@ def _judge_report(
             measures=measures,
         )
     return pass_with(f"{part_name.capitalize()} reported {_format_entries(answer_row)}.", measures=measures)
+
+
+def _build_missing_entry(answer_row: Row, number: int, texts: Sequence[str]) -> MissingEntry:
+    previous = _format_entry(answer_row[number - 1]) if number else ""
+    return MissingEntry(_format_entry(answer_row[number]), previous, tuple(texts))
 
 
 def _find_expected_row(criterion: Reports, trial: TrialResult) -> Row:
@@ -196,7 +203,11 @@ def _describe_tolerance(criterion: Reports, answer_row: Sequence[Entry]) -> str:
 
 
 def _format_entries(entries: Sequence[Entry]) -> str:
-    return quote_list(tuple(entry if isinstance(entry, str) else f"{entry:g}" for entry in entries))
+    return quote_list(tuple(map(_format_entry, entries)))
+
+
+def _format_entry(entry: Entry) -> str:
+    return entry if isinstance(entry, str) else f"{entry:g}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+from service.grading.findings import ExtraText, HurriedSpeech, OtherWord
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
@@ -69,6 +70,7 @@ def _judge_best_run(
             reference_line.t,
             get_pose_at(recording, reference_line.t),
             Fraction(found_count, count),
+            findings=(_build_other_word(criterion, timed_words, found_count, end),),
         )
     if end < len(timed_words) and not criterion.more:
         word, line = timed_words[end]
@@ -78,6 +80,7 @@ def _judge_best_run(
             line.t,
             get_pose_at(recording, line.t),
             Fraction(count, count + len(timed_words) - end),
+            findings=(ExtraText(word),),
         )
     hurried_line = _find_hurried_line(lines) if criterion.waits else None
     if hurried_line is not None:
@@ -87,11 +90,20 @@ def _judge_best_run(
             hurried_line.t,
             get_pose_at(recording, hurried_line.t),
             Fraction(1, 2),
+            findings=(HurriedSpeech(),),
         )
     measures = (Measure("words", float(count)), Measure("last at", reference_line.t, "s"))
     return pass_with(
         f"The robot {past} {expected_text}.", reference_line.t, get_pose_at(recording, reference_line.t), measures
     )
+
+
+def _build_other_word(
+    criterion: WordSequence, timed_words: Sequence[tuple[str, TimedText]], found_count: int, end: int
+) -> OtherWord:
+    previous_words = criterion.words[found_count - 1] if found_count else ()
+    actual_word = timed_words[end][0] if end < len(timed_words) else ""
+    return OtherWord(previous_words, actual_word, criterion.words[found_count])
 
 
 def _find_best_run(

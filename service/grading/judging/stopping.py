@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from service.grading.findings import OtherReading, StillRunning
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_still_mask,
@@ -37,7 +38,8 @@ def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
         expectation, end_t = _describe_expected(criterion), recording.end_t
         message = f"Expected the robot to stop {expectation}, but its program was still running after {end_t:.2f} s."
-        return replace(fail_with(message, end_t, recording.end), has_end_reason=fault.verdict is Verdict.TIME_LIMIT)
+        outcome = fail_with(message, end_t, recording.end, findings=(StillRunning(),))
+        return replace(outcome, has_end_reason=fault.verdict is Verdict.TIME_LIMIT)
     if not len(recording.ticks):
         return fail_with(
             f"Expected the robot to stop {_describe_expected(criterion)}, but it never moved: no time passed."
@@ -51,6 +53,7 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
     position = locate_part(recording, side, recording.end)
     rgb = (recording.ticks.left_rgb if side == "left" else recording.ticks.right_rgb)[-1]
     reading = 100 * int(rgb[0]) / 255
+    reading_problem: tuple[str, str] | None = None
     checks: list[tuple[bool, str, str]] = []  # whether it holds, the expected value, the actual value
     position_text = f"at ({position[0]:.1f}, {position[1]:.1f})"
     # Everything off the floor is black, so the reading covers only the floor.
@@ -66,9 +69,8 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
     if criterion.reflected is not None:
         minimum, maximum = criterion.reflected
         is_reading_right = floor_share > 0 and minimum <= reading / floor_share <= maximum
-        checks.append(
-            (is_reading_right, f"reading {_format_range(minimum, maximum)} %", f"reading {reading:.2f} %{floor_note}")
-        )
+        reading_problem = f"reading {_format_range(minimum, maximum)} %", f"reading {reading:.2f} %{floor_note}"
+        checks.append((is_reading_right, *reading_problem))
     if criterion.rgb is not None:
         is_close = floor_share > 0 and all(
             abs(a / floor_share - b) <= criterion.rgb_tolerance for a, b in zip(rgb, criterion.rgb, strict=True)
@@ -107,6 +109,7 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
         recording.end,
         Fraction(sum(holds for holds, _, _ in checks), len(checks)),
         measures,
+        findings=(OtherReading(round(reading, 2)),) if problem == reading_problem else (),
     )
 
 

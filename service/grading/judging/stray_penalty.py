@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from service.grading.findings import StrayItems
 from service.grading.judging.outcome import Outcome, fail_with
 from submissions.criteria.common import CriterionWithStrays
 
@@ -42,4 +43,5 @@ def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, count:
         outcome.score * count / (count + excess),
         outcome.measures,
         outcome.for_staff,
+        (*outcome.findings, StrayItems(strays.misplaced + strays.others, outcome.passed)),
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from responders.message_format import JSON, PY
+from service.grading.findings import ExtraText
 from service.grading.grade import TrialResult
 from service.grading.judging.agent_pairs import build_pair
 from service.grading.judging.answers import MISSING, Answers, as_text, find_at_path, is_json_answer, parse_json_answer
@@ -93,6 +94,7 @@ def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
         worse_outcome.message,
         worse_outcome.t,
         worse_outcome.pose,
+        findings=worse_outcome.findings,
     )
 
 
@@ -209,7 +211,8 @@ def _judge_order(
     score = Fraction(len(matched_lines), len(required_texts) + extra_count)
     if criterion.only and extra_line is not None:
         message = f"{expected}, but it {wording.past} {quote_text(extra_line.text)} as well."
-        return fail_with(message, extra_line.t, get_pose_at(recording, extra_line.t), score), matched_lines
+        extra_pose, findings = get_pose_at(recording, extra_line.t), (ExtraText(extra_line.text),)
+        return fail_with(message, extra_line.t, extra_pose, score, findings=findings), matched_lines
     if len(matched_lines) < len(required_texts):
         missing_text = quote_text(required_texts[len(matched_lines)])
         problem = (

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from service.grading.findings import Finding, LateResend, MissingAnswer
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
 from service.grading.judging.channel_losses import describe_loss, is_lost_by_chance, is_out_of_reach
@@ -75,7 +76,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
             get_pose_at(recording, last_time),
             measures,
         )
-    question, (t, mistake) = mistakes[0]
+    question, (t, mistake, findings) = mistakes[0]
     right_count = count - len(mistakes)
     return fail_with(
         f"Expected the robot to send {quote_text(question.text)} again until its answer "
@@ -84,6 +85,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
         get_pose_at(recording, t),
         Fraction(right_count, count),
         measures,
+        findings=findings,
     )
 
 
@@ -249,29 +251,34 @@ def _is_intact(reply: Message) -> bool:
     return reply.delivered is not None and reply.arrived_as is None and reply.note != "malformed"
 
 
-def _find_mistake(criterion: Resends, question: _Question, recording: Recording) -> tuple[float, str] | None:
-    """Return the time and description of the first wrong resend of a text; None if all are right."""
+def _find_mistake(
+    criterion: Resends, question: _Question, recording: Recording
+) -> tuple[float, str, tuple[Finding, ...]] | None:
+    """Return the time, description and findings of the first wrong resend of a text; None if all are right."""
     minimum, maximum = criterion.every
     answer_time = question.answered_at
     end_time = recording.end_t if answer_time is None else answer_time
     times = [message.t for message in question.tries]
     for number, (t, next_time) in enumerate(zip(times, [*times[1:], None], strict=True), 1):
         if answer_time is not None and t > answer_time + 1e-9:
-            return t, f"it sent the message again at {t:.2f} s, after its answer had come at {answer_time:.2f} s"
+            description = f"it sent the message again at {t:.2f} s, after its answer had come at {answer_time:.2f} s"
+            return t, description, (LateResend(),)
         if criterion.at_most is not None and number > criterion.at_most:
-            return t, f"it sent the message {len(times)} times"
+            return t, f"it sent the message {len(times)} times", ()
         if next_time is not None and next_time - t < minimum - _ROUNDING:
             return (
                 next_time,
                 f"it did not wait for the answer: it sent the message at {t:.2f} s and again at {next_time:.2f} s",
+                (),
             )
         if next_time is not None and next_time - t > maximum + _ROUNDING:
-            return t, f"it sent the message at {t:.2f} s and again only at {next_time:.2f} s"
+            return t, f"it sent the message at {t:.2f} s and again only at {next_time:.2f} s", ()
         is_last_try = next_time is None and (criterion.at_most is None or number < criterion.at_most)
         if is_last_try and answer_time is None and _has_stopped_trying(t, maximum, recording):
-            return t, f"it sent the message {_format_times(number)}, last at {t:.2f} s, and no answer came"
+            description = f"it sent the message {_format_times(number)}, last at {t:.2f} s, and no answer came"
+            return t, description, (MissingAnswer(),)
         if is_last_try and answer_time is not None and end_time - t > maximum + _ROUNDING:
-            return t, f"it sent the message {_format_times(number)}, and its answer came only at {end_time:.2f} s"
+            return t, f"it sent the message {_format_times(number)}, and its answer came only at {end_time:.2f} s", ()
     return None
 
 
