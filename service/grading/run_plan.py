@@ -12,11 +12,18 @@ from typing import Any
 
 from responders.notebook_process import NotebookSpec
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.running_child import ChildLimits
 from responders.source_file import SourceFile
 from responders.trial_spec import AgentSpec, ExecutedStatements, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.grade import TrialResult
 from service.grading.notebook_trial import NotebookTrial
+from service.grading.part_specs import (
+    ProgramHead,
+    build_program_spec,
+    build_responder_spec,
+    choose_code,
+    collect_files,
+    read_head,
+)
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.motion import Rectangle
@@ -26,14 +33,11 @@ from submissions.assignment.other_parts import SAME
 from submissions.bundle import find_missing_part
 from submissions.criteria.code import Functions, SourceRules
 from submissions.diagram_cells import read_diagrams
-from submissions.magics import Flags, apply_flags, comment_out_magic, split_program
+from submissions.magics import Flags
 from submissions.marked_run import RunChoice, choose_run
 from submissions.notebook_python import extract_python
 from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed, compute_world_seed
-from submissions.source_text import find_modules
 from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
-
-_MEGABYTE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,21 +182,19 @@ def _plan_files(submission: Submission, assignment: Assignment) -> RunPlan:
         parts = replace(parts, program="none")
     elif missing_part == "responder":
         parts = replace(parts, responder="none")
-    code = _choose_code("robot program", "robot.py", parts.program, submission.program, assignment)
-    responder = _choose_code("responder", "responder.py", parts.responder, submission.responder, assignment)
-    head = _read_head(code.text, assignment) if code is not None else _ProgramHead(Flags(), "", ())
+    code = choose_code("robot program", "robot.py", parts.program, submission.program, assignment)
+    responder = choose_code("responder", "responder.py", parts.responder, submission.responder, assignment)
+    head = read_head(code.text, assignment) if code is not None else ProgramHead(Flags(), "", ())
     notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
         notes += ("your responder is not used: this assignment uses another one, or none",)
-    files = _collect_files(submission, assignment, parts.program)
+    files = collect_files(submission, assignment, parts.program)
     program = (
-        _build_program_spec(SourceFile(code.name, head.text), head.flags, files, assignment)
+        build_program_spec(SourceFile(code.name, head.text), head.flags, files, assignment)
         if code is not None
         else None
     )
-    responder_spec = _build_responder_spec(
-        responder, _collect_files(submission, assignment, parts.responder), assignment
-    )
+    responder_spec = build_responder_spec(responder, collect_files(submission, assignment, parts.responder), assignment)
     plan = _plan_separate_parts(ProgramTrial(), program, head.flags, responder_spec, assignment, notes)
     if missing_part == "program" and (question_program := _build_question_program(assignment)) is not None:
         note = "your responder was called by a Robomark program that only sends the texts"
@@ -208,7 +210,7 @@ def _build_question_program(assignment: Assignment) -> ProgramSpec | None:
     if not texts:
         return None
     text = f"import time\nfor text in {texts!r}:\n    print(text)\n    time.sleep(0.5)\n"
-    return _build_program_spec(SourceFile("questions.py", text), Flags(), {}, assignment)
+    return build_program_spec(SourceFile("questions.py", text), Flags(), {}, assignment)
 
 
 def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assignment) -> RunPlan:
@@ -217,14 +219,14 @@ def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assig
     if parts.program == "none":
         return _plan_executed_notebook(submission, notebook, assignment, None, Flags(), ())
     if parts.program != "student":
-        head = _read_head(assignment.given_parts[parts.program], assignment)
+        head = read_head(assignment.given_parts[parts.program], assignment)
         plan = _plan_executed_notebook(
             submission, notebook, assignment, SourceFile(parts.program, head.text), head.flags, head.notes
         )
         return replace(plan, ignored_magic=head.ignored)
     choice = choose_run(notebook, assignment, submission.run)
     site, cell = choice.site, choice.run.program
-    head = _read_head(cell.source if cell is not None else "", assignment)
+    head = read_head(cell.source if cell is not None else "", assignment)
     if parts.responder == "student":
         # Executing the notebook reports an unreadable magic line, and may reach another cell.
         notes = () if head.ignored else head.notes
@@ -237,12 +239,10 @@ def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assig
         )
     if cell is None:
         raise UsageError(f"{notebook.name}: has no cell that begins with %%sim_magic_preloaded, expected one.")
-    responder = _choose_code("responder", "responder.py", parts.responder, None, assignment)
-    files = _collect_files(submission, assignment, parts.program)
-    program = _build_program_spec(SourceFile(f"cell {cell.number}", head.text), head.flags, files, assignment)
-    responder_spec = _build_responder_spec(
-        responder, _collect_files(submission, assignment, parts.responder), assignment
-    )
+    responder = choose_code("responder", "responder.py", parts.responder, None, assignment)
+    files = collect_files(submission, assignment, parts.program)
+    program = build_program_spec(SourceFile(f"cell {cell.number}", head.text), head.flags, files, assignment)
+    responder_spec = build_responder_spec(responder, collect_files(submission, assignment, parts.responder), assignment)
     notes = (*head.notes, f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
     plan = _plan_separate_parts(ProgramTrial(cell.number), program, head.flags, responder_spec, assignment, notes)
     return replace(plan, ignored_magic=head.ignored)
@@ -282,8 +282,8 @@ def _plan_executed_notebook(
     choice: RunChoice | None = None,
 ) -> RunPlan:
     """Plan a notebook that runs from top to bottom. Its cells without robot programs are the responder."""
-    files = _collect_files(submission, assignment, "student")
-    functions = _build_responder_spec(SourceFile(notebook.name, extract_python(notebook)), files, assignment)
+    files = collect_files(submission, assignment, "student")
+    functions = build_responder_spec(SourceFile(notebook.name, extract_python(notebook)), files, assignment)
     assert functions is not None
     sources = tuple(cell.source for cell in notebook.cells)
     spec = NotebookSpec(notebook.name, sources, files, functions.limits, functions.output_bytes, 0)
@@ -298,9 +298,7 @@ def _plan_executed_notebook(
     return RunPlan(
         assignment,
         NotebookTrial(spec, choice, is_text_checked),
-        _build_program_spec(
-            program, flags, _collect_files(submission, assignment, assignment.parts.program), assignment
-        )
+        build_program_spec(program, flags, collect_files(submission, assignment, assignment.parts.program), assignment)
         if program
         else None,
         None,
@@ -320,13 +318,11 @@ def _add_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
         raise UsageError(f"{assignment.id} has two robots, which no notebook can answer, expected robot.py")
     if source == SAME:
         return replace(plan, second_program=plan.program, second_flags=plan.flags, collaborative=True)
-    code = _choose_code(
-        "second robot program", SECOND_PROGRAM, source, submission.find_code(SECOND_PROGRAM), assignment
-    )
+    code = choose_code("second robot program", SECOND_PROGRAM, source, submission.find_code(SECOND_PROGRAM), assignment)
     assert code is not None
-    head = _read_head(code.text, assignment)
-    program = _build_program_spec(
-        SourceFile(code.name, head.text), head.flags, _collect_files(submission, assignment, source), assignment
+    head = read_head(code.text, assignment)
+    program = build_program_spec(
+        SourceFile(code.name, head.text), head.flags, collect_files(submission, assignment, source), assignment
     )
     return replace(
         plan,
@@ -338,97 +334,16 @@ def _add_second_program(plan: RunPlan, submission: Submission) -> RunPlan:
     )
 
 
-def _choose_code(
-    part_name: str, file_name: str, source: str, submitted_code: SourceFile | None, assignment: Assignment
-) -> SourceFile | None:
-    if source == "none":
-        return None
-    if source != "student":
-        return SourceFile(source, assignment.given_parts[source])
-    if submitted_code is None:
-        raise UsageError(f"the submission has no {part_name}; {assignment.id} asks for {file_name}")
-    return submitted_code
-
-
-@dataclass(frozen=True, slots=True)
-class _ProgramHead:
-    """A program's flags, its text after the magic line, notes on both, and why that line is ignored, if it is."""
-
-    flags: Flags
-    text: str
-    notes: tuple[str, ...]
-    ignored: str = ""
-
-
-def _read_head(text: str, assignment: Assignment) -> _ProgramHead:
-    """Parse a program's magic line. Notes say where the assignment overrides it."""
-    try:
-        flags, text = split_program(text)
-        settings = apply_flags(flags)
-    except UsageError as error:
-        note = f"the program's magic line is ignored: {error}"
-        return _ProgramHead(Flags(), comment_out_magic(text), (note,), str(error))
-    world = assignment.world
-    notes = []
-    if "b" in flags.values and settings.background != world.background:
-        background = flags.values["b"][:40]
-        notes.append(f"the program asks for the background {background}; the assignment's is {world.background}")
-    if "r" in flags.values and settings.robot != world.robot:
-        notes.append(f"the program asks for the robot {settings.robot}; the assignment's is {world.robot}")
-    if flags.values.keys() & {"N", "M"}:
-        notes.append("the assignment's noise is used, not the program's -N or -M")
-    return _ProgramHead(flags, text, tuple(notes))
-
-
-def _collect_files(submission: Submission, assignment: Assignment, source: str) -> Mapping[str, bytes]:
-    """Return the files in the folder of a part of ``source``. Submitted files override given ones.
-
-    Parts from the assignment cannot import the submission's code.
-    """
-    submitted_files = submission.files_without(assignment.parts.agents)
-    own_files = (each for each in submitted_files.items() if source == "student" or not each[0].endswith(".py"))
-    return {**assignment.given, **dict(own_files)}
-
-
 def _plan_agents(submission: Submission, assignment: Assignment) -> dict[str, AgentSpec]:
     """Plan the agents. Each has a folder and limits like the responder's; given agents see only given files."""
     agents = {}
     for name, source in assignment.parts.agents.items():
         is_given = source != "student"
         code = SourceFile(source, assignment.given_parts[source]) if is_given else submission.find_agent_code(name)
-        spec = _build_responder_spec(
-            code, assignment.given if is_given else _collect_files(submission, assignment, source), assignment
+        spec = build_responder_spec(
+            code, assignment.given if is_given else collect_files(submission, assignment, source), assignment
         )
         if spec is None:
             raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
         agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=is_given)
     return agents
-
-
-def _build_program_spec(
-    code: SourceFile, flags: Flags, files: Mapping[str, bytes], assignment: Assignment
-) -> ProgramSpec:
-    limits = assignment.limits
-    child_limits = ChildLimits(
-        limits.program_cpu, limits.program_memory_mb * _MEGABYTE, _collect_avoided_modules(assignment, "program")
-    )
-    return ProgramSpec(code, flags.preamble, child_limits, limits.output_bytes, find_modules(code.text, files.get))
-
-
-def _build_responder_spec(
-    code: SourceFile | None, files: Mapping[str, bytes], assignment: Assignment
-) -> ResponderSpec | None:
-    if code is None:
-        return None
-    limits = assignment.limits
-    avoided_modules = _collect_avoided_modules(assignment, "responder")
-    child_limits = ChildLimits(limits.responder_cpu, limits.responder_memory_mb * _MEGABYTE, avoided_modules)
-    return ResponderSpec(code, files, child_limits, limits.output_bytes)
-
-
-def _collect_avoided_modules(assignment: Assignment, part: Part) -> tuple[str, ...]:
-    """Return the modules that a student's part may not import. Marked import rules are also enforced at run time."""
-    if getattr(assignment.parts, part) != "student":
-        return ()
-    rules = (each for each in assignment.criteria if isinstance(each, SourceRules) and each.part == part and each.marks)
-    return tuple(sorted({module for each in rules for module in each.avoided_modules}))

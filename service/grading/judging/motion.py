@@ -1,6 +1,6 @@
 """Judging of motion: overall, move by move, there and back, and after a sensor reading.
 
-``moves.py`` finds the moves. ``path.py`` judges where on the floor the robot went.
+``moves.py`` finds the moves, ``reactions.py`` what follows a reading. ``path.py`` judges where the robot went.
 """
 
 from __future__ import annotations
@@ -10,17 +10,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from service.grading.findings import OtherMove, OtherTurn
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_positions,
-    compute_still_mask,
-    compute_times,
-    compute_travel,
     find_place,
-    find_true_runs,
 )
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
@@ -35,15 +30,13 @@ from service.grading.judging.moves import (
     split_moves,
 )
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
-from sim.camera import HEIGHT, WIDTH
+from service.grading.judging.reactions import find_answered_falls, find_falls
 from sim.recording import Floats, Recording
 from sim.recording_values import get_recorded_robot
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves, NamedMotion
 
 #: The smallest height of a turning point above the path around it, mm.
 _MIN_MOTION = 5.0
-#: The smallest reversal (mm), turn (degrees) and stop (ticks) that count after an encounter.
-_REVERSED, _TURNED, _STOPPED = 5.0, 15.0, 3
 
 
 @declare_judge(Displacement)
@@ -202,8 +195,8 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
 def judge_encounters(criterion: Encounters, trial: TrialResult) -> Outcome:
     """Judge the robot's reaction in the seconds after each fall of the reading below the threshold."""
     recording = trial.recording
-    falls = _find_falls(criterion, recording)
-    answered_falls = _find_answered_falls(criterion, recording, falls)
+    falls = find_falls(criterion, recording)
+    answered_falls = find_answered_falls(criterion, recording, falls)
     measures = (Measure("encounters", len(falls)), Measure("answered", len(answered_falls)))
     score = Fraction(min(len(answered_falls), criterion.at_least), criterion.at_least)
     if len(answered_falls) >= criterion.at_least:
@@ -364,61 +357,6 @@ def _compute_distance_ahead(recording: Recording) -> Floats:
 def _read_wheel_positions(recording: Recording) -> tuple[float, float]:
     ticks = recording.ticks
     return (float(ticks.left_position[-1]), float(ticks.right_position[-1])) if len(ticks) else (0.0, 0.0)
-
-
-def _find_falls(criterion: Encounters, recording: Recording) -> list[int]:
-    """Return the rows at which a sensor's reading fell below the threshold. Readings off the floor don't count."""
-    ticks = recording.ticks
-    readings = {"left": ticks.left_rgb, "right": ticks.right_rgb}
-    is_dark: NDArray[np.bool_] = np.zeros(len(ticks), dtype=bool)
-    for side, rgb in readings.items():
-        if criterion.light in (side, "either"):
-            x, y = compute_positions(recording, "left_light" if side == "left" else "right_light")[1:].T
-            radius = get_recorded_robot(recording).left_light.diameter / 2
-            is_on_floor = (x >= radius) & (x <= WIDTH - radius) & (y >= radius) & (y <= HEIGHT - radius)
-            is_dark |= is_on_floor & (rgb[:, 0] / 255 * 100 < criterion.below)
-    return [first + 1 for first, _ in find_true_runs(is_dark)]
-
-
-def _find_answered_falls(criterion: Encounters, recording: Recording, falls: list[int]) -> list[int]:
-    """Return the falls after which everything required happened in order and in time."""
-    forward_steps, turns = compute_travel(recording)
-    motion = _Motion(-np.minimum(forward_steps, 0), turns, compute_still_mask(recording))
-    t = compute_times(recording)
-    ends = np.searchsorted(t, t[falls] + criterion.seconds, side="right") - 1
-    return [
-        row
-        for row, end in zip(falls, ends.tolist(), strict=True)
-        if _has_all_reactions(criterion.then, motion, row, end)
-    ]
-
-
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    """The motion in each tick, shape (n,): mm backwards, degrees, and whether the robot stood still."""
-
-    backwards: Floats
-    turned: Floats
-    still: NDArray[np.bool_]
-
-
-def _has_all_reactions(reactions: tuple[str, ...], motion: _Motion, start: int, end: int) -> bool:
-    for reaction in reactions:
-        window = slice(start, end)
-        if reaction == "reverse":
-            is_reached = np.cumsum(motion.backwards[window]) >= _REVERSED
-        elif reaction == "turn":
-            is_reached = np.abs(np.cumsum(motion.turned[window])) >= _TURNED
-        else:
-            still_counts = np.cumsum(motion.still[window])
-            is_reached = (
-                still_counts - np.concatenate([np.zeros(_STOPPED, dtype=int), still_counts])[: len(still_counts)]
-                >= _STOPPED
-            )
-        if not is_reached.any():
-            return False
-        start += int(np.argmax(is_reached)) + 1
-    return True
 
 
 def _format_times(count: int) -> str:

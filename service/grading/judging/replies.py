@@ -26,7 +26,7 @@ from service.grading.judging.channel_losses import describe_loss, is_lost_by_cha
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
-from service.grading.judging.texts import describe_conditions, is_accepted_text, is_same_text
+from service.grading.judging.text_conditions import describe_conditions, is_accepted_text, is_same_text
 from sim.recording import Message
 from sim.recording_values import get_pose_at
 from submissions.criteria.replies import Replies, list_allowed_answers

@@ -1,30 +1,35 @@
 """Judging of printed, said and sent texts: which ones count, how many there are, and their order.
 
-The texts come from students, the patterns from instructors. Matching takes time linear in the length of the text.
+``text_conditions.py`` decides whether one text counts, ``robot_queue.py`` judges the growth of the robot's queue.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from responders.message_format import JSON, PY
 from service.grading.findings import ExtraText
 from service.grading.grade import TrialResult
 from service.grading.judging.agent_pairs import build_pair
-from service.grading.judging.answers import MISSING, Answers, as_text, find_at_path, is_json_answer, parse_json_answer
-from service.grading.judging.channel_losses import describe_loss, is_lost_by_chance, is_out_of_reach
+from service.grading.judging.channel_losses import is_lost_by_chance
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.robot_queue import collect_queue_lines, is_queued, judge_queue_growth
 from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
-from service.grading.judging.text_tokens import find_words, split_words
-from sim.recording import Message, Recording, TimedText
+from service.grading.judging.text_conditions import (
+    SOMETHING,
+    describe_conditions,
+    is_accepted_text,
+    is_same_text,
+    normalise_text,
+)
+from sim.recording import Recording, TimedText
 from sim.recording_values import get_pose_at
 from submissions.criteria.expressions import has_match
-from submissions.criteria.texts import Messages, Prints, Says, TextConditions, TextSequence
+from submissions.criteria.texts import Messages, Prints, Says, TextSequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +42,6 @@ class TextWording:
     addressed: bool = False
 
 
-#: The beginning of conditions that are more than quoted texts.
-_SOMETHING = "something that "
 #: The beginning of a text that is compared, in characters.
 _MAX_COMPARED = 200
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
@@ -82,7 +85,7 @@ def judge_messages(criterion: Messages, trial: TrialResult) -> Outcome:
     recording = trial.recording
     if not criterion.queue_grows:
         return _judge_texts(criterion, recording)
-    growth_outcome = _judge_queue_growth(recording)
+    growth_outcome = judge_queue_growth(recording)
     has_count = (criterion.at_least, criterion.at_most, criterion.exactly) != (None, None, None)
     if not (criterion.has_conditions or criterion.in_order or has_count):
         return growth_outcome
@@ -116,49 +119,6 @@ def judge_sequence(
         max(_find_count_bounds(criterion)[0], 1),
         _find_extra_lines(criterion, lines, accepted_lines, wording),
     )
-
-
-def is_accepted_text(criterion: TextConditions, text: str) -> bool:
-    """Return whether a text meets all given conditions."""
-    fold = criterion.ignore_case
-    normalised = _normalise_text(text, fold)
-    if criterion.equals and normalised not in [_normalise_text(wanted, fold) for wanted in criterion.equals]:
-        return False
-    if criterion.starts_with and not normalised.startswith(
-        tuple(_normalise_text(w, fold) for w in criterion.starts_with)
-    ):
-        return False
-    if not all(_normalise_text(wanted, fold) in normalised for wanted in criterion.contains):
-        return False
-    if criterion.among and len(_find_named_choices(criterion.among, text)) != 1:
-        return False
-    return criterion.matches is None or has_match(text, criterion.matches, fold)
-
-
-def describe_conditions(criterion: TextConditions) -> str:
-    """Return the conditions in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
-    has_other_conditions = (
-        criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
-    )
-    if criterion.equals and not has_other_conditions:
-        return quote_list(criterion.equals, "or")
-    clauses = []
-    if criterion.equals:
-        clauses.append(f"is {quote_list(criterion.equals, 'or')}")
-    if criterion.starts_with:
-        clauses.append(f"starts with {quote_list(criterion.starts_with, 'or')}")
-    if criterion.contains:
-        clauses.append(f"contains {quote_list(criterion.contains)}")
-    if criterion.among:
-        clauses.append(f"names only one of {quote_list(criterion.among)}")
-    if criterion.matches is not None:
-        clauses.append(f"matches the pattern {quote_text(criterion.matches)}")
-    return f"{_SOMETHING}{' and '.join(clauses)}" if clauses else ""
-
-
-def is_same_text(text: str, expected: str, ignore_case: bool) -> bool:
-    """Return whether two texts are equal apart from blanks at the ends, repeated blanks and, if requested, case."""
-    return _normalise_text(text, ignore_case) == _normalise_text(expected, ignore_case)
 
 
 def _judge_last(
@@ -206,7 +166,7 @@ def _judge_order(
     if criterion.only:
         expected += " and nothing else"
         conditions = describe_conditions(criterion)
-        expected += f" that {conditions.removeprefix(_SOMETHING)}" if conditions.startswith(_SOMETHING) else ""
+        expected += f" that {conditions.removeprefix(SOMETHING)}" if conditions.startswith(SOMETHING) else ""
     extra_count = len(accepted_lines) - len(matched_lines) if criterion.only else 0
     score = Fraction(len(matched_lines), len(required_texts) + extra_count)
     if criterion.only and extra_line is not None:
@@ -358,9 +318,9 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
             else _SEND
         )
         return judge_sequence(criterion, sent_texts, wording, recording)
-    arrived_messages = [message for message in recording.messages if _is_queued(message)]
+    arrived_messages = [message for message in recording.messages if is_queued(message)]
     arrived_texts = [(message.delivered or 0.0, message.received) for message in arrived_messages]
-    outcome = judge_sequence(criterion, _collect_queue_lines(criterion, arrived_texts), _RECEIVE, recording)
+    outcome = judge_sequence(criterion, collect_queue_lines(criterion, arrived_texts), _RECEIVE, recording)
     lost_answers = [
         message for message in recording.messages if message.sender == "responder" and is_lost_by_chance(message)
     ]
@@ -371,100 +331,11 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
         id(message): (message.delivered or message.t, message.text) for message in (*arrived_messages, *lost_answers)
     }
     excused_outcome = judge_sequence(
-        criterion, _collect_queue_lines(criterion, answered_texts.values()), _RECEIVE, recording
+        criterion, collect_queue_lines(criterion, answered_texts.values()), _RECEIVE, recording
     )
     if excused_outcome.score <= outcome.score:
         return outcome
     return replace(excused_outcome, message=f"{excused_outcome.message} {_EXCUSED}")
-
-
-def _collect_queue_lines(criterion: Messages, answers: Iterable[tuple[float, str]]) -> list[TimedText]:
-    """Return the answers that join the robot's queue, in order of time, reduced to the requested value."""
-    lines = []
-    for t, text in sorted(answers, key=lambda answer: answer[0]):
-        value = parse_json_answer(text)
-        value = value if value is MISSING or criterion.path is None else find_at_path(value, criterion.path)
-        if value is not MISSING:
-            lines.append(TimedText(t, as_text(value)))
-    return lines
-
-
-def _is_queued(message: Message) -> bool:
-    """Return whether it is an answer that joined the robot's queue."""
-    if message.sender != "responder" or message.delivered is None:
-        return False
-    if message.arrived_as is not None:
-        return is_json_answer(message.arrived_as)
-    return message.text.startswith(JSON) and message.note != "malformed"
-
-
-def _judge_queue_growth(recording: Recording) -> Outcome:
-    """Judge whether every PY:: message that reached the responder has its JSON:: answer in the queue, in order.
-
-    Answers that the channel lost by chance, or that came when the message was sent again, are not missed.
-    """
-    sent_messages = [
-        (index, message)
-        for index, message in enumerate(recording.messages)
-        if message.sender == "robot" and message.text.startswith(PY)
-    ]
-    received_messages = [(index, message) for index, message in sent_messages if message.delivered is not None]
-    expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
-    if not received_messages:
-        unreachable_message = next((message for _, message in sent_messages if is_out_of_reach(message)), None)
-        if sent_messages and not unreachable_message:
-            return pass_with("The channel lost every PY:: message by chance, so there were no answers to queue.")
-        reason = (
-            f"the channel lost {quote_text(unreachable_message.text)} ({describe_loss(unreachable_message)})"
-            if unreachable_message
-            else ""
-        )
-        return fail_with(f"{expected}, but {reason or 'the robot sent no PY:: message'}.")
-    answers = Answers(recording)
-    replies = [(message, _find_reply(answers, index)) for index, message in received_messages]
-    arrivals = [reply.delivered for _, reply in replies if reply is not None and _is_queued(reply)]
-    answered_texts = {message.text for message, reply in replies if reply is not None and _is_queued(reply)}
-    # A repeated message shows nothing new.
-    distinct_texts = {message.text for _, message in received_messages}
-    missed_messages = [
-        (message, reply) for message, reply in replies if not _is_excused(message, reply, answered_texts)
-    ]
-    score = Fraction(len(distinct_texts - {message.text for message, _ in missed_messages}), len(distinct_texts))
-    for message, reply in missed_messages:
-        problem = "got no answer" if reply is None else f"was answered with {quote_text(reply.text)}"
-        if reply is not None and reply.delivered is None and reply.note == "undelivered":
-            problem = "got its answer only after the program had ended"
-        if reply is not None and is_out_of_reach(reply):
-            problem = f"was answered and the channel lost the answer ({describe_loss(reply)})"
-        return fail_with(
-            f"{expected}, but {quote_text(message.text)} {problem} ({len(arrivals)} of {len(received_messages)} "
-            "in the queue).",
-            message.t,
-            get_pose_at(recording, message.t),
-            score,
-        )
-    if not arrivals:
-        return pass_with("The channel lost every answer by chance.")
-    times = [arrived or 0.0 for arrived in arrivals]
-    if times != sorted(times):
-        return fail_with(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
-    return pass_with(
-        f"The robot's queue grew by one for each of {len(arrivals)} messages.",
-        times[-1],
-        get_pose_at(recording, times[-1]),
-    )
-
-
-def _find_reply(answers: Answers, index: int) -> Message | None:
-    """Return the answer that joined the queue, the first of several copies; otherwise the first answer."""
-    return next(filter(_is_queued, answers.list_answers(index)), answers.find_answer(index))
-
-
-def _is_excused(message: Message, reply: Message | None, answered_texts: Container[str]) -> bool:
-    """Return whether a message's answer is in the queue, or missing only because of the channel."""
-    if reply is None:
-        return False
-    return _is_queued(reply) or is_lost_by_chance(reply) or (is_out_of_reach(reply) and message.text in answered_texts)
 
 
 def _is_text_match(criterion: TextSequence, text: str, expected: str) -> bool:
@@ -473,19 +344,8 @@ def _is_text_match(criterion: TextSequence, text: str, expected: str) -> bool:
         case "equals":
             return is_same_text(text, expected, fold)
         case "contains":
-            return _normalise_text(expected, fold) in _normalise_text(text, fold)
+            return normalise_text(expected, fold) in normalise_text(text, fold)
         case "starts_with":
-            return _normalise_text(text, fold).startswith(_normalise_text(expected, fold))
+            return normalise_text(text, fold).startswith(normalise_text(expected, fold))
         case "matches":
             return has_match(text, expected, fold)
-
-
-def _find_named_choices(choices: Sequence[str], text: str) -> list[str]:
-    """Return the choices that a text contains as whole words."""
-    words = split_words(text)
-    return [choice for choice in choices if find_words(words, split_words(choice)) is not None]
-
-
-def _normalise_text(text: str, ignore_case: bool) -> str:
-    normalised = " ".join(text.split())
-    return normalised.casefold() if ignore_case else normalised

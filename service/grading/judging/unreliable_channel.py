@@ -18,8 +18,8 @@ from service.grading.judging.channel_losses import describe_loss, is_lost_by_cha
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_text
 from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
+from service.grading.judging.text_conditions import describe_conditions, is_accepted_text
 from service.grading.judging.text_tokens import split_words
-from service.grading.judging.texts import describe_conditions, is_accepted_text
 from sim.recording import Message, Recording, TimedText, Verdict
 from sim.recording_values import get_pose_at
 from submissions.criteria.texts import TextConditions
