@@ -231,7 +231,7 @@ def collect_clues(
         plan.missing,
         plan.flags.preamble,
         plan.collaborative,
-        tuple(_remove_hidden_evidence(each, visible_indices) for each in results if each.id in lost_ids),
+        tuple(remove_hidden_evidence(each, visible_indices) for each in results if each.id in lost_ids),
         min((each.seconds for each in plan.assignment.scenarios if each.visibility == "visible"), default=0.0),
         plan.assignment.description,
         tuple(_build_extra_listings(submission)),
@@ -242,7 +242,7 @@ def collect_clues(
         plan.assignment.id,
         plan.assignment,
         tuple(
-            _remove_hidden_evidence(each, visible_indices)
+            remove_hidden_evidence(each, visible_indices)
             for each in results
             if each.visibility == "visible" and not each.max_marks
         ),
@@ -251,7 +251,7 @@ def collect_clues(
     )
 
 
-def _remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -> CriterionResult:
+def remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -> CriterionResult:
     """Return the result without anything that comes from hidden trials."""
     evidence = tuple(each for each in result.evidence if each.trial in visible_indices)
     findings = {index: each for index, each in result.findings.items() if index is None or index in visible_indices}
