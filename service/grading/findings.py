@@ -140,6 +140,11 @@ class OtherMove(Finding):
 
 
 @dataclass(frozen=True, slots=True)
+class OtherSide(Finding):
+    """The robot went or turned to the left instead of to the right, or the reverse."""
+
+
+@dataclass(frozen=True, slots=True)
 class OtherTurn(Finding):
     """The angle by which the robot turned instead, in degrees."""
 

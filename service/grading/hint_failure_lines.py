@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from service.grading.findings import ExtraText, LateResend, MissingAnswer, OtherMove, StillRunning
+from service.grading.findings import ExtraText, LateResend, MissingAnswer, OtherMove, OtherSide, StillRunning
 from service.grading.grade import Evidence
 from service.grading.hint_clues import Clues, F, Listing
 from service.grading.hint_code import CallInCode, Statement, join_tokens
@@ -28,7 +28,6 @@ from submissions.criteria.stopping import StopOn
 from submissions.criteria.unreliable_channel import Resends
 
 _ONE_SENSOR = re.compile(r"\b(left|right) (?:light )?sensor\b", re.IGNORECASE)
-_OTHER_SIDE = re.compile(r"to the (left|right)\b.* but it was .*to the (?!\1)(?:left|right)")
 _WRITING_FUNCTIONS = frozenset({"print", "say", "speak"})
 _SIDES = {"left": "colorLeft", "right": "colorRight"}
 _BLOCK_HEADS = frozenset({"if", "elif", "while", "for"})
@@ -230,7 +229,7 @@ def _hint_about_other_sensor(failure: _Failure) -> str:
 def _hint_about_crossing(failure: _Failure) -> str:
     """Return a hint on sensors that drive the motors so that the robot turns to the other side than required."""
     statement = next((each for each in failure.lines if any(_is_steering(call) for call in each.calls)), None)
-    if statement is None or not _OTHER_SIDE.search(failure.found):
+    if statement is None or failure.find_finding(OtherSide) is None:
         return ""
     if not any(each.has_token(*PROPERTIES) for each in failure.listing.code.statements):
         return ""

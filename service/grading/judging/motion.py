@@ -11,7 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from service.grading.findings import OtherMove, OtherTurn
+from service.grading.findings import OtherMove, OtherSide, OtherTurn
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_positions,
@@ -23,8 +23,8 @@ from service.grading.judging.moves import (
     Move,
     build_move,
     build_move_measures,
-    describe_mismatch,
     describe_range,
+    find_mismatch,
     format_number,
     orient_range,
     split_moves,
@@ -55,9 +55,11 @@ def judge_displacement(criterion: Displacement, trial: TrialResult) -> Outcome:
         Measure("right wheel", right_position, "°"),
     )
     t, end = recording.end_t, recording.end
-    mismatch = describe_mismatch(criterion, total_move)
+    mismatch = find_mismatch(criterion, total_move)
     if mismatch is not None:
-        return fail_with(f"Expected, from start to end, {mismatch}.", t, end, measures=measures)
+        findings = (OtherSide(),) if mismatch.is_other_side else ()
+        message = f"Expected, from start to end, {mismatch.words}."
+        return fail_with(message, t, end, measures=measures, findings=findings)
     for side, bounds, value in (
         ("left", criterion.left_wheel, left_position),
         ("right", criterion.right_wheel, right_position),
@@ -266,7 +268,7 @@ def _find_turning_points(forward_distances: Floats) -> list[_TurningPoint]:
 
 def _match_moves(criterion: Moves, moves: tuple[Move, ...]) -> list[Move | None]:
     """Return the move matched to each required one, with as many matches as possible."""
-    matches = [[describe_mismatch(wanted, move) is None for move in moves] for wanted in criterion.moves]
+    matches = [[find_mismatch(wanted, move) is None for move in moves] for wanted in criterion.moves]
 
     def find_next_match(wish: int, start: int) -> int | None:
         return next((place for place in range(start, len(moves)) if matches[wish][place]), None)
@@ -343,7 +345,7 @@ def _count_missed_conditions(required_move: NamedMotion, move: Move) -> int:
     parts = ("forward", "sideways", "distance", "turn", "turn_size", "seconds")
     conditions = (part for part in parts if getattr(required_move, part) is not None)
     return sum(
-        describe_mismatch(NamedMotion(**{part: getattr(required_move, part)}), move) is not None for part in conditions
+        find_mismatch(NamedMotion(**{part: getattr(required_move, part)}), move) is not None for part in conditions
     )
 
 

@@ -32,6 +32,7 @@ _LASTING = 9
 _NO_BOUND = 10_000
 #: A rest of at most this many ticks does not split a move.
 _REST = 2
+_LEFT = " to the left"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,13 +101,21 @@ def _classify_ticks(recording: Recording) -> NDArray[np.int8]:
     return np.where(compute_still_mask(recording), 0, kinds).astype(np.int8)
 
 
-def describe_mismatch(required: MotionConditions, move: Move) -> str | None:
-    """Return how a move differs from the required one, ``a turn of 85 to 95°, but it was 80°``; None if it matches."""
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """The difference between a move and the required one, as ``a turn of 85 to 95°, but it was 80°``."""
+
+    words: str
+    is_other_side: bool
+
+
+def find_mismatch(required: MotionConditions, move: Move) -> Mismatch | None:
+    """Return the first condition that a move does not meet; None if it meets all."""
     conditions = (
         ("a distance from where it began", "", "", required.distance, move.distance, " mm"),
         ("a distance", " forwards", " backwards", required.forward, move.forward, " mm"),
-        ("a distance", " to the left", " to the right", required.sideways, move.sideways, " mm"),
-        ("a turn", " to the left", " to the right", required.turn, move.turn, "°"),
+        ("a distance", _LEFT, " to the right", required.sideways, move.sideways, " mm"),
+        ("a turn", _LEFT, " to the right", required.turn, move.turn, "°"),
         ("a turn", "", "", required.turn_size, abs(move.turn), "°"),
         ("a time", "", "", required.seconds, move.seconds, " s"),
     )
@@ -116,7 +125,8 @@ def describe_mismatch(required: MotionConditions, move: Move) -> str | None:
         side, minimum, maximum = orient_range(bounds, positive, negative)
         actual = format_number(abs(value))
         direction = "" if actual == "0" else negative if value < 0 else positive
-        return f"{noun}{side} of {describe_range(minimum, maximum, unit)}, but it was {actual}{unit}{direction}"
+        words = f"{noun}{side} of {describe_range(minimum, maximum, unit)}, but it was {actual}{unit}{direction}"
+        return Mismatch(words, positive == _LEFT and bool(direction) and side != direction)
     return None
 
 
