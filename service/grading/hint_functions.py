@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
+from dataclasses import replace
 
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.findings import FailedCall, UnloadedResponder, WrongHiddenCalls, WrongReturn
@@ -166,7 +167,9 @@ def _hint_about_function_error(criterion: Functions, clues: Clues) -> str:
     listing = next((each for each in clues.responders if each.part == "responder"), None)
     if fault is None or fault.verdict is not Verdict.RESPONDER_ERROR or fault.line is None or listing is None:
         return ""
-    return "" if fault.file else f"{listing.locate(fault.line)}: {describe_error(fault, clues)}"
+    # The tables give better advice than the similar name of an attribute: math.pi and not pi for math.PI.
+    error = describe_error(replace(fault, hint=""), clues)
+    return "" if fault.file else f"{listing.locate(fault.line)}: {error}"
 
 
 def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
