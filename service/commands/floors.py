@@ -20,7 +20,7 @@ def floors(
     from service.reports.html import PrintedFloor, render_floor_gallery
     from service.reports.output_files import prepare_folder, write_page
     from service.reports.plots.floor import draw_floor
-    from service.reports.plots.style import render_png
+    from service.reports.plots.png import render_png
     from sim.floors import build_floor, list_floor_names, list_label_names
 
     prepare_folder(output)

@@ -41,7 +41,7 @@ from service.reports.plots.diagram_drawing import draw_diagram
 from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.own_diagrams import format_cell_title
 from service.reports.plots.path import draw_path
-from service.reports.plots.style import render_png
+from service.reports.plots.png import render_png
 from service.reports.replay.document import Pixels, build_run_replay
 from service.reports.replay.sources import Sources, collect_cell_sources, collect_file_sources
 from service.reports.robots import iterate_robots

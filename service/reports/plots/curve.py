@@ -9,34 +9,36 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+import numpy as np
+from matplotlib.markers import MarkerStyle
 
 from service.reports.display_text import to_one_line
-from service.reports.plots.style import (
-    FAINT,
-    FAULT,
-    HEAD,
-    INK,
-    LEFT,
-    RIGHT,
-    RULE,
-    SAID,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    replace_missing_glyphs,
-    set_tick_size,
-    write_text,
-)
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, create_drawing
+from service.reports.plots.panel import Panel, choose_ticks
+from service.reports.plots.style import FAINT, FAULT, HEAD, LEFT, RIGHT, RULE, SAID, WIDTH
 
-#: Colour, line and marker of the curves, in order. They differ without colour too.
-_STYLES = ((LEFT, "-", "o"), (RIGHT, "--", "s"), (SAID, ":", "^"), (FAINT, "-.", "D"))
+
+@dataclass(frozen=True, slots=True)
+class CurveStyle:
+    """Colour, dashes in points and marker of a curve."""
+
+    colour: str
+    dashes: tuple[float, ...]
+    marker: MarkerStyle
+
+
+#: The styles of the curves, in order. They differ without colour too.
+CURVE_STYLES = (
+    CurveStyle(LEFT, (), MarkerStyle("o")),
+    CurveStyle(RIGHT, (5.2, 2.2), MarkerStyle("s")),
+    CurveStyle(SAID, (1.4, 2.3), MarkerStyle("^")),
+    CurveStyle(FAINT, (9.0, 2.2, 1.4, 2.2), MarkerStyle("D")),
+)
 _LEFT, _RIGHT_MARGIN = 0.62, 0.16
 _PANEL, _BELOW, _ABOVE = 1.22, 0.46, 0.36  # inches: the axes, its labels, its title
 _FOOT = 0.26
+_Y_TICKS, _Y_LABELS = (0, 0.25, 0.5, 0.75, 1), ("0", "0.25", "0.5", "0.75", "1")
+_LEGEND_LINE, _CHARACTER_WIDTH = 0.135, 0.066  # inches
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,68 +63,93 @@ class AccuracyPanel:
     level: float | None = None
 
 
-def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", unit: str = "images") -> Figure:
+def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", unit: str = "images") -> Drawing:
     """Draw the panels below each other, all with an axis from 0 to 1. ``unit`` is the unit of ``n``."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
-    figure = create_figure(height, title, subtitle)
+    drawing = create_drawing(height, title, subtitle)
     for number, panel in enumerate(panels):
         top = height - HEAD - row * number
-        write_text(figure, 0.08, top - 0.14, to_one_line(panel.varied, 40), size=9, bold=True, va="center")
-        write_text(figure, WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, unit), size=8, ha="right",
-              va="center", colour=FAINT)  # fmt: skip
-        axes = add_axes(figure, _LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
-        draw_panel(axes, panel)
-    write_text(figure, 0.08, 0.09, "line: accuracy;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
-    return figure
-
-
-def draw_panel(axes: Axes, panel: AccuracyPanel) -> None:
-    """Draw all curves of one panel, with labelled axes and, for several curves, a legend."""
-    axes.set_ylim(-0.04, 1.04)
-    axes.yaxis.set_major_locator(FixedLocator([0, 0.25, 0.5, 0.75, 1]))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2f}".rstrip("0").rstrip(".")))
-    axes.grid(axis="y", color=RULE, linewidth=0.5)
-    axes.set_axisbelow(True)
-    for curve, style in zip(panel.curves, _cycle_styles(len(panel.curves)), strict=True):
-        draw_curve(axes, curve, *style)
-    xs = sorted({x for curve in panel.curves for x in curve.x})
-    if len(xs) <= 9:
-        axes.xaxis.set_major_locator(FixedLocator(_select_ticks(xs)))
-    else:
-        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}")))
-    axes.set_xlabel(
-        replace_missing_glyphs(f"{to_one_line(panel.varied, 40)}, {panel.unit}"),
-        font=load_font(8),
-        color=INK,
-        labelpad=2,
-    )
-    axes.set_ylabel("accuracy", font=load_font(8), color=INK, labelpad=3)
-    set_tick_size(axes)
-    if panel.level is not None:
-        axes.axhline(panel.level, color=FAULT, linewidth=0.9, linestyle=(0, (6, 2)), zorder=2)
-        axes.text(
-            0.995, panel.level - 0.03, f"required: {panel.level:g}", transform=axes.get_yaxis_transform(), ha="right",
-            va="top", color=FAULT, font=load_font(7.5),
+        drawing.add_text(0.08, top - 0.14, to_one_line(panel.varied, 40), size=9, bold=True, vertical="center")
+        drawing.add_text(
+            WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, unit), size=8, colour=FAINT,
+            horizontal="right", vertical="center",
         )  # fmt: skip
-    if len(panel.curves) > 1:
-        legend = axes.legend(loc="best", prop=load_font(7.5), frameon=True, framealpha=0.85, borderpad=0.3)
-        legend.get_frame().set_edgecolor(RULE)
+        place = Rectangle(_LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
+        _draw_panel(drawing, place, panel)
+    drawing.add_text(0.08, 0.09, "line: accuracy;  band: 95 % interval (Wilson)", size=7.5, colour=FAINT)
+    return drawing
 
 
-def draw_curve(axes: Axes, curve: Curve, colour: str = LEFT, line: str = "-", marker: str = "o") -> None:
+def _draw_panel(drawing: Drawing, place: Rectangle, accuracies: AccuracyPanel) -> None:
+    """Draw all curves of one panel, with labelled axes and, for several curves, a legend."""
+    xs = sorted({x for curve in accuracies.curves for x in curve.x})
+    panel = Panel(drawing, place, choose_limits(xs), (-0.04, 1.04))
+    panel.add_grid((), _Y_TICKS, opacity=1)
+    for number, curve in enumerate(accuracies.curves):
+        draw_curve(panel, curve, CURVE_STYLES[number % len(CURVE_STYLES)])
+    if accuracies.level is not None:
+        _draw_required_level(panel, accuracies.level)
+    panel.add_frame()
+    x_ticks = _select_ticks(xs) if len(xs) <= 9 else choose_ticks(panel.x_limits, 9)
+    panel.add_x_axis(x_ticks, label=f"{to_one_line(accuracies.varied, 40)}, {accuracies.unit}")
+    panel.add_y_axis(_Y_TICKS, _Y_LABELS, label="accuracy")
+    if len(accuracies.curves) > 1:
+        _draw_legend(panel, accuracies.curves)
+
+
+def choose_limits(xs: Sequence[float]) -> tuple[float, float]:
+    """Return limits around ``xs``, with a margin on both sides."""
+    low, high = (min(xs), max(xs)) if xs else (0.0, 1.0)
+    margin = 0.05 * (high - low) or 0.05
+    return low - margin, high + margin
+
+
+def draw_curve(panel: Panel, curve: Curve, style: CurveStyle = CURVE_STYLES[0]) -> None:
     """Draw one curve: its band, then its line, with a marker at each measured value."""
     if len(curve.x) > 1:
-        axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.18, linewidth=0, zorder=3)
+        band = [*zip(curve.x, curve.low, strict=True), *reversed([*zip(curve.x, curve.high, strict=True)])]
+        panel.add_area(band, fill=style.colour, opacity=0.18)
         for edge in (curve.low, curve.high):
-            axes.plot(curve.x, edge, color=colour, alpha=0.55, linewidth=0.6, zorder=3)
+            panel.add_line(zip(curve.x, edge, strict=True), Stroke(style.colour, 0.6, opacity=0.55))
     else:
-        axes.vlines(curve.x, curve.low, curve.high, color=colour, linewidth=1.2, zorder=3)
-    axes.plot(
-        curve.x, curve.share, color=colour, linestyle=line, marker=marker, markersize=3.4, linewidth=1.4, zorder=4,
-        label=replace_missing_glyphs("\n".join(textwrap.wrap(to_one_line(curve.label, 40), 26))),
+        for x, low, high in zip(curve.x, curve.low, curve.high, strict=True):
+            panel.add_line([(x, low), (x, high)], Stroke(style.colour, 1.2))
+    points = np.column_stack((curve.x, curve.share))
+    panel.add_line(points, Stroke(style.colour, 1.4, style.dashes))
+    panel.add_marks(points, style.marker, 3.4, fill=style.colour, edge=Stroke(style.colour, 1))
+
+
+def _draw_required_level(panel: Panel, level: float) -> None:
+    left, right = panel.x_limits
+    panel.add_line([(left, level), (right, level)], Stroke(FAULT, 0.9, (5.4, 1.8)))
+    panel.add_text(
+        right - 0.005 * (right - left), level - 0.03, f"required: {level:g}", size=7.5, colour=FAULT,
+        horizontal="right", vertical="top",
     )  # fmt: skip
+
+
+def _draw_legend(panel: Panel, curves: Sequence[Curve]) -> None:
+    """Draw the curves' names on a white card, in the corner at the left where the curves leave more room."""
+    names = ["\n".join(textwrap.wrap(to_one_line(curve.label, 40), 26)) for curve in curves]
+    line_counts = [name.count("\n") + 1 for name in names]
+    width = 0.42 + max(len(line) for name in names for line in name.split("\n")) * _CHARACTER_WIDTH
+    height = _LEGEND_LINE * sum(line_counts) + 0.06
+    place = panel.place
+    first_shares = [curve.share[0] for curve in curves if curve.share]
+    is_above = sum(first_shares) < 0.5 * len(first_shares)
+    bottom = place.bottom + place.height - height - 0.05 if is_above else place.bottom + 0.05
+    drawing = panel.drawing
+    drawing.add_rectangle(Rectangle(place.left + 0.05, bottom, width, height), fill="white", edge=Stroke(RULE, 0.8))
+    y = bottom + height - 0.03
+    for number, (name, line_count) in enumerate(zip(names, line_counts, strict=True)):
+        style = CURVE_STYLES[number % len(CURVE_STYLES)]
+        middle = y - _LEGEND_LINE / 2
+        left = place.left + 0.1
+        drawing.add_line([(left, middle), (left + 0.26, middle)], Stroke(style.colour, 1.4, style.dashes))
+        drawing.add_marks([(left + 0.13, middle)], style.marker, 3.4, style.colour, Stroke(style.colour, 1))
+        drawing.add_text(left + 0.32, y - 0.012, name, size=7.5, vertical="top")
+        y -= _LEGEND_LINE * line_count
 
 
 def _format_counts(curves: Sequence[Curve], unit: str) -> str:
@@ -140,7 +167,3 @@ def _select_ticks(xs: Sequence[float]) -> list[float]:
         if not ticks or x - ticks[-1] >= (xs[-1] - xs[0]) / 18:
             ticks.append(x)
     return ticks
-
-
-def _cycle_styles(count: int) -> list[tuple[str, str, str]]:
-    return [_STYLES[place % len(_STYLES)] for place in range(count)]

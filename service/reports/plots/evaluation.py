@@ -9,30 +9,16 @@ import textwrap
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
 from models.cards import CardCurve, Tally
 from models.evaluation import ClassifiedImage, Evaluation
 from models.preprocessing import Grey
 from service.reports.plots.confusion import ConfusionTable, draw_confusion_table
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
-from service.reports.plots.style import (
-    FAINT,
-    FAULT,
-    HEAD,
-    INK,
-    RULE,
-    SAID,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    render_png,
-    replace_missing_glyphs,
-    write_text,
-)
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, Vertical, create_drawing
+from service.reports.plots.panel import Panel
+from service.reports.plots.png import render_png
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, RULE, SAID, WIDTH
 
 MAX_MISREAD = 10
 _SIDE, _GAP, _ROW = 0.74, 0.12, 0.92
@@ -50,7 +36,7 @@ def render_evaluation_plots(evaluation: Evaluation) -> dict[str, bytes]:
     }
 
 
-def draw_evaluation_confusion(evaluation: Evaluation) -> Figure:
+def draw_evaluation_confusion(evaluation: Evaluation) -> Drawing:
     """Draw the confusion matrix."""
     measured, classes = evaluation.measured, evaluation.card.classes
     table = ConfusionTable(classes, classes, measured.confusion, tuple(sum(row) for row in measured.confusion))
@@ -63,7 +49,7 @@ def describe_tally(tally: Tally) -> str:
     return f"accuracy {tally.share:.3f}, 95 % interval {low:.3f} to {high:.3f}, n = {tally.n} images"
 
 
-def draw_robustness(evaluation: Evaluation) -> Figure:
+def draw_robustness(evaluation: Evaluation) -> Drawing:
     """Draw one panel for each varied condition."""
     panels: dict[str, list[CardCurve]] = {}
     for curve in evaluation.measured.curves:
@@ -80,7 +66,7 @@ def draw_robustness(evaluation: Evaluation) -> Figure:
 
 def render_comparison_plot(names: Sequence[str], curve_groups: Sequence[Sequence[CardCurve]]) -> bytes:
     """Return a PNG with one panel per condition, and in it one curve for each classifier in ``names``."""
-    figure = draw_curves(
+    drawing = draw_curves(
         [
             AccuracyPanel(
                 f"{curves[0].varied}, {curves[0].under}",
@@ -92,7 +78,7 @@ def render_comparison_plot(names: Sequence[str], curve_groups: Sequence[Sequence
         f"{', '.join(names[:-1])} and {names[-1]}: robustness",
         "same places and same noise for each model",
     )
-    return render_png(figure)
+    return render_png(drawing)
 
 
 def _build_curve(card_curve: CardCurve, label: str | None = None) -> Curve:
@@ -109,7 +95,7 @@ def _build_curve(card_curve: CardCurve, label: str | None = None) -> Curve:
     )
 
 
-def draw_evaluation_misread(evaluation: Evaluation) -> Figure:
+def draw_evaluation_misread(evaluation: Evaluation) -> Drawing:
     """Draw at most ``MAX_MISREAD`` misread images, each beside its nearest correctly read neighbours.
 
     One neighbour is of the true class, one of the answered class. Distance is the mean square of the differences of
@@ -121,24 +107,21 @@ def draw_evaluation_misread(evaluation: Evaluation) -> Figure:
     count_text = f"{len(shown_images)} of {count}" if len(shown_images) < count else f"all {count}" if count else "none"
     title = f"{evaluation.card.name}: misread images"
     if not shown_images:
-        figure = create_figure(HEAD + 0.3, title, f"none of n = {total_count} images was misread")
-        write_text(figure, 0.08, 0.1, "No misread images.", size=9)
-        return figure
+        drawing = create_drawing(HEAD + 0.3, title, f"none of n = {total_count} images was misread")
+        drawing.add_text(0.08, 0.1, "No misread images.", size=9)
+        return drawing
     heading_height = 0.40
     height = heading_height + _ROW * len(shown_images)
-    figure = create_figure(
+    drawing = create_drawing(
         HEAD + height + 0.06, title, f"{count_text} misread, of n = {total_count} images; 14 × 14 grey pixels"
     )
-    axes = add_axes(figure, 0.08, 0.06, WIDTH - 0.16, height)
-    axes.set_axis_off()
-    axes.set_xlim(-0.05, WIDTH - 0.21)
-    axes.set_ylim(height, 0)
+    panel = Panel(drawing, Rectangle(0.08, 0.06, WIDTH - 0.16, height), (-0.05, WIDTH - 0.21), (height, 0))
     for column, heading in enumerate(("misread", "nearest correct\nof that class", "nearest correct\nof that answer")):
-        _draw_text(axes, column * (_SIDE + _GAP), heading_height - 0.20, heading, FAINT, 7.4, va="center")
+        _draw_text(panel, column * (_SIDE + _GAP), heading_height - 0.20, heading, FAINT, 7.4, vertical="center")
     correct_images = [each for each in evaluation.answered if each.right]
     for row, image in enumerate(shown_images):
-        _draw_row(axes, evaluation.card.classes, image, correct_images, heading_height + row * _ROW)
-    return figure
+        _draw_row(panel, evaluation.card.classes, image, correct_images, heading_height + row * _ROW)
+    return drawing
 
 
 def _rank_mistakes(misread: Sequence[ClassifiedImage]) -> list[ClassifiedImage]:
@@ -158,7 +141,7 @@ def _rank_mistakes(misread: Sequence[ClassifiedImage]) -> list[ClassifiedImage]:
 
 
 def _draw_row(
-    axes: Axes,
+    panel: Panel,
     classes: tuple[str, ...],
     misread_image: ClassifiedImage,
     correct_images: Sequence[ClassifiedImage],
@@ -173,7 +156,7 @@ def _draw_row(
         )
     ):
         if image is not None:
-            _draw_grey(axes, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
+            _draw_grey(panel, image.grey, column * (_SIDE + _GAP), y, colour, dashed=column > 0)
     lines = [
         (f"shows {classes[true_label]}", INK, True),
         (f"✗ read as {classes[answer_label]}", FAULT, True),
@@ -182,7 +165,7 @@ def _draw_row(
     line_count = 0
     for text, colour, bold in lines:
         wrapped_lines = textwrap.wrap(text, _LINE)
-        _draw_text(axes, _TEXT, y + 0.02 + 0.14 * line_count, "\n".join(wrapped_lines), colour, 8, bold=bold)
+        _draw_text(panel, _TEXT, y + 0.02 + 0.14 * line_count, "\n".join(wrapped_lines), colour, 8, bold=bold)
         line_count += len(wrapped_lines)
 
 
@@ -203,18 +186,15 @@ def _find_nearest(
     return same_label_images[int(((greys - target_image.grey) ** 2).mean(axis=(1, 2)).argmin())]
 
 
-def _draw_grey(axes: Axes, grey: Grey, x: float, y: float, colour: str, *, dashed: bool) -> None:
-    axes.imshow(grey, cmap="gray", vmin=0, vmax=255, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest",
-                aspect="auto")  # fmt: skip
-    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))
-    edge = Rectangle((x - 0.03, y - 0.03), _SIDE + 0.06, _SIDE + 0.06, facecolor="none", edgecolor=colour,
-                     linewidth=1.0 if dashed else 1.8, linestyle=(0, (2.5, 1.5)) if dashed else "-")  # fmt: skip
-    axes.add_patch(edge)
+def _draw_grey(panel: Panel, grey: Grey, x: float, y: float, colour: str, *, dashed: bool) -> None:
+    panel.add_picture(np.repeat(np.asarray(grey, np.uint8)[:, :, None], 3, axis=2), x, y, x + _SIDE, y + _SIDE)
+    panel.add_rectangle((x, y), _SIDE, _SIDE, edge=Stroke(RULE, 0.8))
+    edge = Stroke(colour, 1.0, (2.5, 1.5)) if dashed else Stroke(colour, 1.8)
+    panel.add_rectangle((x - 0.03, y - 0.03), _SIDE + 0.06, _SIDE + 0.06, edge=edge)
 
 
 def _draw_text(
-    axes: Axes, x: float, y: float, text: str, colour: str, size: float, *, bold: bool = False, va: str = "top"
-) -> None:
-    axes.text(x, y, replace_missing_glyphs(text), color=colour, font=load_font(size, bold=bold), va=va,
-              parse_math=False,
-              linespacing=1.0)  # fmt: skip
+    panel: Panel, x: float, y: float, text: str, colour: str, size: float,
+    *, bold: bool = False, vertical: Vertical = "top",
+) -> None:  # fmt: skip
+    panel.add_text(x, y, text, colour=colour, size=size, bold=bold, vertical=vertical)

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from matplotlib.figure import Figure
-
 from service.grading.grade import AccuracyCurve, Grade
 from service.reports.display_text import to_one_line
 from service.reports.plots.confusion import draw_confusion
 from service.reports.plots.curve import AccuracyPanel, Curve, draw_curves
+from service.reports.plots.drawing import Drawing
 from service.reports.plots.misread_images import draw_misread
 from service.reports.plots.path import draw_path
 from service.reports.plots.plot import Plot
@@ -27,7 +26,7 @@ from sim.recording_values import rebuild_floor
 from submissions.sweep import CONDITIONS, VariedCondition
 
 
-def draw_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Figure:
+def draw_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Drawing:
     """Draw the plot."""
     if plot.kind == "path":
         trial = grade.trials[plot.subject]

@@ -34,6 +34,8 @@ from submissions.diagram_cells import DiagramCell
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from service.reports.plots.drawing import Drawing
+
 _log = logging.getLogger(__name__)
 
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
@@ -81,13 +83,15 @@ def _render_own_plot(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> bytes
     return _render_or_explain(plot, partial(draw_own_diagram, own_diagram, grade, plot))
 
 
-def _render_or_explain(plot: Plot, draw: Callable[[], Figure]) -> bytes:
-    """Return the figure from ``draw`` as a PNG, or an image with one sentence if it fails. The log has the cause.
+def _render_or_explain(plot: Plot, draw: Callable[[], Drawing | Figure]) -> bytes:
+    """Return the plot from ``draw`` as a PNG, or an image with one sentence if it fails. The log has the cause.
 
     Raises:
         MemoryError: If memory is short, so that the plot can be drawn later.
     """
-    from service.reports.plots.style import HEAD, create_figure, render_png
+    from service.reports.plots.drawing import create_drawing
+    from service.reports.plots.png import render_png
+    from service.reports.plots.style import HEAD
 
     try:
         return render_png(draw())
@@ -95,7 +99,7 @@ def _render_or_explain(plot: Plot, draw: Callable[[], Figure]) -> bytes:
         raise
     except Exception:
         _log.exception("the plot %s cannot be drawn", plot.name)
-    return render_png(create_figure(HEAD, "This plot cannot be drawn because of an error in Robomark."))
+    return render_png(create_drawing(HEAD, "This plot cannot be drawn because of an error in Robomark."))
 
 
 def group_same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:

@@ -6,120 +6,82 @@ The caller supplies the floor image.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
-from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
 from service.reports.display_text import format_heading, format_whole_number
-from service.reports.plots.path_marks import draw_marks, draw_times, to_world
-from service.reports.plots.style import (
-    FAINT,
-    FAULT,
-    HEAD,
-    INK,
-    LEFT,
-    PEN,
-    RIGHT,
-    RULE,
-    SECOND_ROBOT,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    write_text,
-)  # fmt: skip
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, create_drawing
+from service.reports.plots.floor_image import FLOOR_HEIGHT, FLOOR_WIDTH, Viewport, draw_floor_part, draw_small_floor
+from service.reports.plots.panel import Panel
+from service.reports.plots.path_marks import draw_marks, draw_numbers, draw_times, to_world
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, LEFT, OFF_THE_FLOOR, PEN, RIGHT, SECOND_ROBOT, WIDTH
+from sim.floors.canvas import Pixels
 from sim.recording import Pose, Recording
 from sim.recording_values import get_recorded_robot
 
-Pixels = NDArray[np.uint8]
-
-FLOOR_WIDTH, FLOOR_HEIGHT = 2362.0, 1143.0
 _MARGIN = 90.0  # mm around the path
 _MIN_VIEW_SIZE = 520.0  # mm, so that a robot that stands still is shown with its surroundings
 _BEYOND = 700.0  # mm outside the floor that are still shown
 _WHOLE_FLOOR_SHARE = 0.55  # a path that needs more of the floor than this is shown on all of it
 _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.10  # inches
 _LEGEND_COLUMNS = 2
-_OFF_THE_FLOOR = "#a3aab1"
+_LEGEND_COLUMN_WIDTH, _LEGEND_ROW, _SYMBOL_WIDTH = 1.36, 0.162, 0.24  # inches
+_OBSTACLE = "#c8cdd2"
 _ARROWHEAD = Path([(-0.55, -0.55), (1.0, 0.0), (-0.55, 0.55), (-0.2, 0.0), (-0.55, -0.55)])
-
-_BEACON_STYLE: Mapping[str, Any] = MappingProxyType(
-    {"marker": "*", "linestyle": "none", "markersize": 12, "color": RIGHT, "markeredgecolor": INK}
-)
+_ANGLES = np.linspace(0, 2 * math.pi, 24, endpoint=False)
+_CIRCLE_POINTS = np.column_stack((np.cos(_ANGLES), np.sin(_ANGLES)))
+_DOT, _STAR, _SQUARE, _CROSS = MarkerStyle("o"), MarkerStyle("*"), MarkerStyle("s"), MarkerStyle("x")
 
 
 @dataclass(frozen=True, slots=True)
-class Viewport:
-    """The part of the world that is drawn, mm."""
+class _DrivenPath:
+    """One robot's recording, its colour, and x, y and heading of the start and every tick, shape (n + 1, 3)."""
 
-    left: float
-    bottom: float
-    right: float
-    top: float
-
-    @property
-    def width(self) -> float:
-        """The width, mm."""
-        return self.right - self.left
-
-    @property
-    def height(self) -> float:
-        """The height, mm."""
-        return self.top - self.bottom
+    recording: Recording
+    points: NDArray[np.float64]
+    colour: str
 
 
-def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Figure:
+def draw_path(trial: TrialResult, title: str, floor: Pixels | None) -> Drawing:
     """Draw the path of ``trial``'s robot. ``floor`` is (1143, 2362, 3), row 0 at y = 1143 mm; None draws it white."""
     recording = trial.recording
-    points = _collect_points(recording)
-    partner = recording.partner
-    partner_points = _collect_points(partner) if partner is not None else points[:0]
-    all_points = np.vstack((points, partner_points))
+    paths = [_DrivenPath(recording, _collect_points(recording), LEFT)]
+    if recording.partner is not None:
+        paths.insert(0, _DrivenPath(recording.partner, _collect_points(recording.partner), SECOND_ROBOT))
+    all_points = np.vstack([path.points for path in reversed(paths)])
     view = _choose_viewport(recording, all_points)
     plot_width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     plot_height = plot_width * view.height / view.width
-    handles = _build_legend(recording, view)
+    legend = _list_legend_entries(recording, view)
     has_locator = view.width < FLOOR_WIDTH
-    legend_rows = -(-len(handles) // _LEGEND_COLUMNS)
+    legend_rows = -(-len(legend) // _LEGEND_COLUMNS)
     foot_height = 0.42 + max(0.62 if has_locator else 0.0, 0.17 * legend_rows + 0.04)
-    figure = create_figure(HEAD + plot_height + foot_height, title, _format_subtitle(trial))
-    axes = add_axes(figure, _LEFT_EDGE, foot_height, plot_width, plot_height)
-    axes.set_xlim(view.left, view.right)
-    axes.set_ylim(view.bottom, view.top)
-    axes.set_facecolor(_OFF_THE_FLOOR)
-    draw_floor_part(axes, floor, view)
-    _draw_obstacles(axes, recording)
-    _draw_beacon(axes, recording)
-    per_inch = view.width / plot_width  # mm
-    if partner is not None:
-        _draw_robot_path(axes, partner, partner_points, per_inch, SECOND_ROBOT)
-    _draw_robot_path(axes, recording, points, per_inch, LEFT)
-    axes.set_xlabel("x, mm", font=load_font(8.5), labelpad=1)
-    axes.set_ylabel("y, mm", font=load_font(8.5), labelpad=1)
-    figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=_LEGEND_COLUMNS, prop=load_font(8),
-        frameon=False, handletextpad=0.5, columnspacing=0.9, labelspacing=0.35, borderaxespad=0.3,
-    )  # fmt: skip
+    drawing = create_drawing(HEAD + plot_height + foot_height, title, _format_subtitle(trial))
+    place = Rectangle(_LEFT_EDGE, foot_height, plot_width, plot_height)
+    panel = Panel(drawing, place, (view.left, view.right), (view.bottom, view.top))
+    panel.fill(OFF_THE_FLOOR)
+    draw_floor_part(panel, floor, view)
+    _draw_surroundings(panel, recording)
+    _draw_robots(panel, paths)
     if _has_points_outside(all_points, view):
-        axes.text(0.5, 0.03, "the path continues outside this image", transform=axes.transAxes, ha="center",
-                  font=load_font(7.5, bold=True), color=INK, zorder=9,
-                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})  # fmt: skip
+        panel.add_text(
+            view.left + view.width / 2, view.bottom + 0.03 * view.height, "the path continues outside this image",
+            bold=True, size=7.5, horizontal="center", background="white",
+        )  # fmt: skip
+    panel.add_frame()
+    panel.add_x_axis(label="x, mm")
+    panel.add_y_axis(label="y, mm")
+    _draw_legend(drawing, legend)
     if has_locator:
-        _draw_locator(figure, floor, view)
-    return figure
+        _draw_locator(drawing, floor, view)
+    return drawing
 
 
 def _format_subtitle(trial: TrialResult) -> str:
@@ -165,69 +127,44 @@ def _widen_viewport(view: Viewport) -> Viewport:
     return Viewport(x - width / 2, y - height / 2, x + width / 2, y + height / 2)
 
 
-def draw_floor_part(axes: Axes, floor: Pixels | None, view: Viewport) -> None:
-    """Draw the part of the floor in ``view``, lightened; white if there is no floor."""
-    if floor is None:
-        axes.add_patch(Rectangle((0, 0), FLOOR_WIDTH, FLOOR_HEIGHT, facecolor="white", edgecolor=RULE))
-        return
-    rows, columns = floor.shape[:2]
-    left, right = max(0, math.floor(view.left)), min(columns, math.ceil(view.right))
-    top, bottom = max(0, math.floor(rows - view.top)), min(rows, math.ceil(rows - view.bottom))
-    if left >= right or top >= bottom:
-        return
-    step = 2 if right - left > 1300 else 1
-    floor_pixels = floor[top:bottom, left:right].astype(np.float32)
-    floor_pixels = floor_pixels[: floor_pixels.shape[0] // step * step, : floor_pixels.shape[1] // step * step]
-    floor_pixels = floor_pixels.reshape(
-        floor_pixels.shape[0] // step, step, floor_pixels.shape[1] // step, step, 3
-    ).mean(axis=(1, 3))
-    # Lightened, so that a path over black stays visible and printing saves ink.
-    light_pixels = np.rint(72 + floor_pixels * (183 / 255)).astype(np.uint8)
-    axes.imshow(
-        light_pixels,
-        extent=(left, left + light_pixels.shape[1] * step, rows - top - light_pixels.shape[0] * step, rows - top),
-        interpolation="nearest",
-        aspect="auto",
-        zorder=0,
-    )
-
-
-def _draw_obstacles(axes: Axes, recording: Recording) -> None:
+def _draw_surroundings(panel: Panel, recording: Recording) -> None:
     for x, y, width, height in recording.obstacles:
-        axes.add_patch(
-            Rectangle((x, y), width, height, facecolor="#c8cdd2", edgecolor=INK, hatch="////", linewidth=0.9)
-        )
-
-
-def _draw_beacon(axes: Axes, recording: Recording) -> None:
+        panel.add_rectangle((x, y), width, height, fill=_OBSTACLE, edge=Stroke(INK, 0.9), hatched=True)
     if recording.beacon is not None:
-        axes.plot(*([value] for value in recording.beacon), **_BEACON_STYLE, zorder=5)
+        panel.add_marks([recording.beacon], _STAR, 12, fill=RIGHT, edge=Stroke(INK, 1))
 
 
-def _draw_robot_path(
-    axes: Axes, recording: Recording, points: NDArray[np.float64], per_inch: float, colour: str
-) -> None:
-    """Draw everything about one robot."""
-    _draw_trace(axes, recording, points, colour)
-    _draw_robot(axes, recording.start, recording, dashed=True)
-    _draw_robot(axes, recording.end, recording, dashed=False)
-    draw_times(axes, recording, points, per_inch, colour)
-    draw_marks(axes, recording, per_inch, colour if colour != LEFT else INK)
+def _draw_robots(panel: Panel, paths: Sequence[_DrivenPath]) -> None:
+    """Draw everything about the robots, the important parts last, so that nothing covers them."""
+    for path in paths:
+        _draw_trace(panel, path)
+    for path in paths:
+        _draw_robot(panel, path.recording.start, path.recording, dashes=(2.7, 1.8))
+        _draw_robot(panel, path.recording.end, path.recording, dashes=())
+    for path in paths:
+        _draw_arrows(panel, path)
+        draw_marks(panel, path.recording, path.colour if path.colour != LEFT else INK)
+    for path in paths:
+        draw_times(panel, path.recording, path.points, path.colour)
+        draw_numbers(panel, path.recording)
 
 
-def _draw_trace(axes: Axes, recording: Recording, points: NDArray[np.float64], colour: str) -> None:
-    for start_row, end_row in _list_pen_strokes(recording, len(points)):
-        axes.plot(
-            points[start_row:end_row, 0], points[start_row:end_row, 1], color=PEN, linewidth=5.5, solid_capstyle="round"
-        )
-    axes.plot(points[:, 0], points[:, 1], color="white", linewidth=3.2, solid_capstyle="round")
-    axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=1.5, solid_capstyle="round")
-    for index in _select_even_rows(points, 10):
-        x, y, heading = points[index]
-        axes.plot(
-            [x], [y], linestyle="none", marker=MarkerStyle(_ARROWHEAD, transform=Affine2D().rotate_deg(heading)),
-            markersize=8, color=colour, markeredgecolor="white", markeredgewidth=0.7, zorder=4,
-        )  # fmt: skip
+def _draw_trace(panel: Panel, path: _DrivenPath) -> None:
+    positions = path.points[:, :2]
+    for start_row, end_row in _list_pen_strokes(path.recording, len(positions)):
+        panel.add_line(positions[start_row:end_row], Stroke(PEN, 5.5))
+    panel.add_line(positions, Stroke("white", 3.2))
+    panel.add_line(positions, Stroke(path.colour, 1.5))
+
+
+def _draw_arrows(panel: Panel, path: _DrivenPath) -> None:
+    for index in _select_even_rows(path.points, 10):
+        x, y, heading = path.points[index]
+        panel.add_marks([(x, y)], _rotate_arrowhead(heading), 8, fill=path.colour, edge=Stroke("white", 0.7))
+
+
+def _rotate_arrowhead(heading: float) -> MarkerStyle:
+    return MarkerStyle(_ARROWHEAD, transform=Affine2D().rotate_deg(heading))
 
 
 def _list_pen_strokes(recording: Recording, count: int) -> list[tuple[int, int]]:
@@ -254,7 +191,7 @@ def _select_even_rows(points: NDArray[np.float64], max_count: int) -> list[int]:
     return sorted({int(row) for row in np.searchsorted(distances, target_distances)} - {0, len(points) - 1})
 
 
-def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -> None:
+def _draw_robot(panel: Panel, pose: Pose, recording: Recording, *, dashes: tuple[float, ...]) -> None:
     if not math.isfinite(pose.x + pose.y + pose.heading):
         return
     robot = get_recorded_robot(recording)
@@ -263,22 +200,11 @@ def _draw_robot(axes: Axes, pose: Pose, recording: Recording, *, dashed: bool) -
         (-robot.half_width, robot.back), (robot.half_width, robot.back), (robot.half_width, nose * 0.55),
         (robot.half_width * 0.6, nose), (-robot.half_width * 0.6, nose), (-robot.half_width, nose * 0.55),
     ]  # fmt: skip
-    axes.add_patch(
-        Polygon(
-            [to_world(pose, x, y) for x, y in outline],
-            closed=True,
-            facecolor=(1, 1, 1, 0.12),
-            edgecolor=INK,
-            linewidth=0.9,
-            linestyle=(0, (3, 2)) if dashed else "solid",
-            zorder=2.5,
-        )
-    )
+    corners = [to_world(pose, x, y) for x, y in outline]
+    panel.add_area(corners, fill="white", opacity=0.12, edge=Stroke(INK, 0.9, dashes))
     for sensor, colour in ((robot.left_light, LEFT), (robot.right_light, RIGHT)):
-        centre = to_world(pose, sensor.x, sensor.y)
-        axes.add_patch(
-            Circle(centre, sensor.diameter / 2, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=2.6)
-        )
+        x, y = to_world(pose, sensor.x, sensor.y)
+        panel.add_area(_CIRCLE_POINTS * (sensor.diameter / 2) + (x, y), edge=Stroke(colour, 0.9))
 
 
 def _has_points_outside(points: NDArray[np.float64], view: Viewport) -> bool:
@@ -286,56 +212,81 @@ def _has_points_outside(points: NDArray[np.float64], view: Viewport) -> bool:
     return bool(((x < view.left) | (x > view.right) | (y < view.bottom) | (y > view.top)).any())
 
 
-def _build_legend(recording: Recording, view: Viewport) -> list[Artist]:
-    """Return a legend handle for every kind of element in the image."""
-    handles: list[Artist] = [
-        Line2D([], [], marker="o", linestyle="none", markersize=7, color="white", markeredgecolor=INK,
-               markeredgewidth=1.6, label="start"),
-        Line2D([], [], marker="o", linestyle="none", markersize=5.5, color=INK, label="end"),
-        Line2D([], [], color=LEFT, linewidth=1.5, marker=MarkerStyle(_ARROWHEAD), markersize=8,
-               markeredgecolor="white", label="path and heading"),
-    ]  # fmt: skip
+@dataclass(frozen=True, slots=True)
+class _LegendEntry:
+    """One kind of element and how its symbol is drawn around a point of the drawing."""
+
+    label: str
+    draw: Callable[[Drawing, float, float], None]
+
+
+def _list_legend_entries(recording: Recording, view: Viewport) -> list[_LegendEntry]:
+    """Return an entry for every kind of element in the image."""
+    entries = [
+        _LegendEntry("start", _mark(_DOT, 7, "white", Stroke(INK, 1.6))),
+        _LegendEntry("end", _mark(_DOT, 5.5, INK, Stroke(INK, 1))),
+        _LegendEntry("path and heading", _arrow(LEFT)),
+    ]
     if recording.partner is not None:
-        handles.append(
-            Line2D([], [], color=SECOND_ROBOT, linewidth=1.5, marker=MarkerStyle(_ARROWHEAD), markersize=8,
-                   markeredgecolor="white", label="path of robot 2")
-        )  # fmt: skip
-    if any(down for _, down in recording.pen):
-        handles.append(Line2D([], [], color=PEN, linewidth=5, label="pen"))
+        entries.append(_LegendEntry("path of robot 2", _arrow(SECOND_ROBOT)))
+    if any(is_down for _, is_down in recording.pen):
+        entries.append(_LegendEntry("pen", _stroke(Stroke(PEN, 5))))
     if recording.images:
-        handles.append(
-            Line2D([], [], marker="s", linestyle="none", markersize=6.5, color="none", markeredgecolor=INK,
-                   markeredgewidth=1.2, label="image sent")
-        )  # fmt: skip
+        entries.append(_LegendEntry("image sent", _mark(_SQUARE, 6.5, None, Stroke(INK, 1.2))))
     if recording.touches:
-        handles.append(
-            Line2D([], [], marker="x", linestyle="none", markersize=7, color=FAULT, markeredgewidth=2, label="touch")
-        )
+        entries.append(_LegendEntry("touch", _mark(_CROSS, 7, None, Stroke(FAULT, 2))))
     if recording.beacon is not None:
-        handles.append(Line2D([], [], **_BEACON_STYLE, label="beacon"))
+        entries.append(_LegendEntry("beacon", _mark(_STAR, 12, RIGHT, Stroke(INK, 1))))
     if recording.obstacles:
-        handles.append(Patch(facecolor="#c8cdd2", edgecolor=INK, hatch="////", label="obstacle"))
+        entries.append(_LegendEntry("obstacle", _box(_OBSTACLE, Stroke(INK, 1), hatched=True)))
     if min(view.left, view.bottom) < -30 or view.right > FLOOR_WIDTH + 30 or view.top > FLOOR_HEIGHT + 30:
-        handles.append(Patch(facecolor=_OFF_THE_FLOOR, label="off the floor"))
-    return handles
+        entries.append(_LegendEntry("off the floor", _box(OFF_THE_FLOOR, None, hatched=False)))
+    return entries
 
 
-def _draw_locator(figure: Figure, floor: Pixels | None, view: Viewport) -> None:
+def _mark(marker: MarkerStyle, size: float, fill: str | None, edge: Stroke) -> Callable[[Drawing, float, float], None]:
+    return lambda drawing, x, y: drawing.add_marks([(x, y)], marker, size, fill, edge)
+
+
+def _stroke(stroke: Stroke) -> Callable[[Drawing, float, float], None]:
+    half = _SYMBOL_WIDTH / 2
+    return lambda drawing, x, y: drawing.add_line([(x - half, y), (x + half, y)], stroke)
+
+
+def _arrow(colour: str) -> Callable[[Drawing, float, float], None]:
+    def draw(drawing: Drawing, x: float, y: float) -> None:
+        _stroke(Stroke(colour, 1.5))(drawing, x, y)
+        drawing.add_marks([(x, y)], MarkerStyle(_ARROWHEAD), 8, colour, Stroke("white", 1))
+
+    return draw
+
+
+def _box(fill: str, edge: Stroke | None, *, hatched: bool) -> Callable[[Drawing, float, float], None]:
+    width, height = _SYMBOL_WIDTH, 0.08
+    return lambda drawing, x, y: drawing.add_rectangle(
+        Rectangle(x - width / 2, y - height / 2, width, height), fill=fill, edge=edge, hatched=hatched
+    )
+
+
+def _draw_legend(drawing: Drawing, entries: Sequence[_LegendEntry]) -> None:
+    """Draw the entries in columns at the lower left, filled column by column."""
+    rows = -(-len(entries) // _LEGEND_COLUMNS)
+    for number, entry in enumerate(entries):
+        column, row = divmod(number, rows)
+        x = 0.08 + _SYMBOL_WIDTH / 2 + column * _LEGEND_COLUMN_WIDTH
+        y = 0.09 + (rows - 1 - row) * _LEGEND_ROW
+        entry.draw(drawing, x, y)
+        drawing.add_text(x + _SYMBOL_WIDTH / 2 + 0.055, y, entry.label, size=8, vertical="middle")
+
+
+def _draw_locator(drawing: Drawing, floor: Pixels | None, view: Viewport) -> None:
+    """Draw the whole floor, small, at the lower right, with a frame around the part that is shown."""
     width = 0.94
     height = width * FLOOR_HEIGHT / FLOOR_WIDTH
-    axes = add_axes(figure, WIDTH - _RIGHT_EDGE - width, 0.06, width, height)
-    axes.set_xlim(0, FLOOR_WIDTH)
-    axes.set_ylim(0, FLOOR_HEIGHT)
-    axes.set_xticks([])
-    axes.set_yticks([])
+    left = WIDTH - _RIGHT_EDGE - width
+    panel = Panel(drawing, Rectangle(left, 0.06, width, height), (0, FLOOR_WIDTH), (0, FLOOR_HEIGHT))
     if floor is not None:
-        small_floor = floor[::6, ::6].astype(np.float32)
-        axes.imshow(
-            np.rint(72 + small_floor * (183 / 255)).astype(np.uint8),
-            extent=(0, FLOOR_WIDTH, 0, FLOOR_HEIGHT),
-            aspect="auto",
-        )
-    axes.add_patch(
-        Rectangle((view.left, view.bottom), view.width, view.height, facecolor="none", edgecolor=FAULT, linewidth=1.4)
-    )
-    write_text(figure, WIDTH - _RIGHT_EDGE - width, 0.10 + height, "whole floor", size=8, colour=FAINT)
+        draw_small_floor(panel, floor)
+    panel.add_frame()
+    panel.add_rectangle((view.left, view.bottom), view.width, view.height, edge=Stroke(FAULT, 1.4))
+    drawing.add_text(left, 0.10 + height, "whole floor", size=8, colour=FAINT)

@@ -9,26 +9,14 @@ import textwrap
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from service.grading.grade import Prediction
 from service.reports.display_text import to_one_line
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, create_drawing
+from service.reports.plots.panel import Panel
 from service.reports.plots.sensor_images import FOCUS, crop_focus, is_right, select_predictions, to_rgb_image
-from service.reports.plots.style import (
-    FAULT,
-    HEAD,
-    INK,
-    RULE,
-    SAID,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    replace_missing_glyphs,
-)
+from service.reports.plots.style import FAULT, HEAD, INK, RULE, SAID, WIDTH
 
 _CARD_WIDTH, _CARD_HEIGHT = 1.93, 1.70
 _LINE = 28  # characters in a line under a card
@@ -36,20 +24,18 @@ _SIDE = 0.83  # inches, the side of an image
 _COLUMNS = 2
 
 
-def draw_predictions(predictions: Sequence[Prediction], title: str) -> Figure:
+def draw_predictions(predictions: Sequence[Prediction], title: str) -> Drawing:
     """Draw cards of at most ``MAX_PREDICTIONS`` images, wrong answers first if not all fit."""
     shown_indices = select_predictions(predictions)
     rows = -(-len(shown_indices) // _COLUMNS)
     height = rows * _CARD_HEIGHT
-    figure = create_figure(HEAD + height + 0.06, title, _format_subtitle(predictions, shown_indices))
-    axes = add_axes(figure, 0.02, 0.06, WIDTH - 0.04, height + 0.06)
-    axes.set_axis_off()
+    drawing = create_drawing(HEAD + height + 0.06, title, _format_subtitle(predictions, shown_indices))
+    place = Rectangle(0.02, 0.06, WIDTH - 0.04, height + 0.06)
+    panel = Panel(drawing, place, (-0.08, WIDTH - 0.12), (height, -0.06))
     for position, number in enumerate(shown_indices):
         x, y = position % _COLUMNS * _CARD_WIDTH, position // _COLUMNS * _CARD_HEIGHT
-        _draw_card(axes, predictions[number], number + 1, x, y)
-    axes.set_xlim(-0.08, WIDTH - 0.12)
-    axes.set_ylim(height, -0.06)
-    return figure
+        _draw_card(panel, predictions[number], number + 1, x, y)
+    return drawing
 
 
 def _format_subtitle(predictions: Sequence[Prediction], shown_indices: Sequence[int]) -> str:
@@ -62,23 +48,18 @@ def _format_subtitle(predictions: Sequence[Prediction], shown_indices: Sequence[
     return f"{count}, {wrong_count} with a wrong answer; each: whole 20×20 image, then its 14×14 part"
 
 
-def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: float) -> None:
+def _draw_card(panel: Panel, prediction: Prediction, number: int, x: float, y: float) -> None:
     is_correct = is_right(prediction)
     full_image, focus_image = np.asarray(to_rgb_image(prediction.image)), np.asarray(crop_focus(prediction.image))
-    _draw_image(axes, full_image, x, y)
-    _draw_image(axes, np.repeat(focus_image[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
+    _draw_image(panel, full_image, x, y)
+    _draw_image(panel, np.repeat(focus_image[:, :, None], 3, axis=2), x + _SIDE + 0.12, y)
     if prediction.image.side == 20:
         pixel = _SIDE / 20
-        axes.add_patch(
-            Rectangle((x + FOCUS[0] * pixel, y + FOCUS[1] * pixel), 14 * pixel, 14 * pixel, facecolor="none",
-                      edgecolor=INK, linewidth=0.9, linestyle=(0, (2.5, 1.5)))
-        )  # fmt: skip
+        corner = (x + FOCUS[0] * pixel, y + FOCUS[1] * pixel)
+        panel.add_rectangle(corner, 14 * pixel, 14 * pixel, edge=Stroke(INK, 0.9, (2.25, 1.35)))
     colour = SAID if is_correct else FAULT
     if not is_correct:
-        axes.add_patch(
-            Rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, facecolor="none", edgecolor=colour,
-                      linewidth=1.8)
-        )  # fmt: skip
+        panel.add_rectangle((x - 0.04, y - 0.04), 2 * _SIDE + 0.20, _SIDE + 0.08, edge=Stroke(colour, 1.8))
     sign, verdict = ("✓", "correct") if is_correct else ("✗", "wrong")
     answer = "no answer" if prediction.answer is None else to_one_line(prediction.answer, 30)
     answer_text = f"answer: {answer}" if prediction.answer is not None else answer
@@ -92,12 +73,10 @@ def _draw_card(axes: Axes, prediction: Prediction, number: int, x: float, y: flo
         (line, INK, False) for text in captions for line in textwrap.wrap(text, _LINE, max_lines=2, placeholder="…")
     ]
     for row, (text, shade, bold) in enumerate(lines):
-        axes.text(
-            x, y + _SIDE + 0.08 + 0.142 * row, replace_missing_glyphs(text), color=shade,
-            font=load_font(8.3, bold=bold), va="top", parse_math=False,
-        )  # fmt: skip
+        line_y = y + _SIDE + 0.08 + 0.142 * row
+        panel.add_text(x, line_y, text, colour=shade, size=8.3, bold=bold, vertical="top")
 
 
-def _draw_image(axes: Axes, pixels: NDArray[np.uint8], x: float, y: float) -> None:
-    axes.imshow(pixels, extent=(x, x + _SIDE, y + _SIDE, y), interpolation="nearest", aspect="auto")
-    axes.add_patch(Rectangle((x, y), _SIDE, _SIDE, facecolor="none", edgecolor=RULE, linewidth=0.8))
+def _draw_image(panel: Panel, pixels: NDArray[np.uint8], x: float, y: float) -> None:
+    panel.add_picture(pixels, x, y, x + _SIDE, y + _SIDE)
+    panel.add_rectangle((x, y), _SIDE, _SIDE, edge=Stroke(RULE, 0.8))

@@ -9,29 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from matplotlib.markers import MarkerStyle
 from numpy.typing import NDArray
 
 from service.grading.grade import TrialResult
-from service.reports.plots.style import (
-    FAINT,
-    FAULT,
-    HEAD,
-    INK,
-    LEFT,
-    RIGHT,
-    RULE,
-    SAID,
-    SECOND_ROBOT,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    set_tick_size,
-    write_text,
-)  # fmt: skip
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, create_drawing
+from service.reports.plots.panel import Panel as PlotPanel
+from service.reports.plots.style import FAINT, FAULT, HEAD, LEFT, RIGHT, RULE, SAID, SECOND_ROBOT, WIDTH
 from sim.columns import Panel
 from sim.recording import COLUMNS, TICK, Recording
 from sim.recording_values import tick_to_seconds
@@ -40,6 +24,7 @@ _LEFT_EDGE, _RIGHT_EDGE = 0.56, 0.12  # inches
 _GAP = 0.20  # between panels, room for the panel's title
 _ROW = 0.15  # height of a strip of events
 _MAX_MARKS = 400  # of one kind; more would form a solid bar
+_CURVE_STROKES = (Stroke(LEFT, 1.1), Stroke(RIGHT, 1.3, (4.2, 1.6)))
 _MAX_READING = 1e100  # a program can set motor positions that are too large to draw
 
 
@@ -69,32 +54,24 @@ class Strip:
     colour: str
 
 
-def draw_sensors(trial: TrialResult, title: str) -> Figure:
+def draw_sensors(trial: TrialResult, title: str) -> Drawing:
     """Draw reflected light (mean red, 0..255), distance (cm), gyro and wheel encoders (degrees) of ``trial``."""
     recording = trial.recording
     panels, strips = build_panels(recording), build_strips(recording)
     strip_height = _ROW * len(strips) + 0.10 if strips else 0.0
     body_height = sum(each.panel.height + _GAP for each in panels)
-    figure = create_figure(HEAD + strip_height + body_height + 0.36, title, _format_subtitle(trial))
+    drawing = create_drawing(HEAD + strip_height + body_height + 0.36, title, _format_subtitle(trial))
     end = max(recording.end_t, tick_to_seconds(recording, len(recording.ticks)), 0.1)
-    top = float(figure.get_size_inches()[1]) - HEAD
+    top = drawing.height - HEAD
     width = WIDTH - _LEFT_EDGE - _RIGHT_EDGE
     if strips:
         top -= strip_height
-        _draw_strips(add_axes(figure, _LEFT_EDGE, top, width, strip_height), strips, end)
+        _draw_strips(drawing, Rectangle(_LEFT_EDGE, top, width, strip_height), strips, end)
     for number, panel in enumerate(panels):
-        height = panel.panel.height
-        top -= height + _GAP
-        axes = add_axes(figure, _LEFT_EDGE, top, width, height)
-        write_text(figure, _LEFT_EDGE, top + height + 0.045, panel.panel.title, size=8, bold=True)
-        _draw_panel(axes, panel, recording.ticks.t, end)
-        if len(panel.curves) > 1:
-            _label_curves(figure, panel, top + height + 0.045)
-        if number < len(panels) - 1:
-            axes.tick_params(labelbottom=False)
-        else:
-            axes.set_xlabel("simulated time, s", font=load_font(8.5), labelpad=1)
-    return figure
+        top -= panel.panel.height + _GAP
+        place = Rectangle(_LEFT_EDGE, top, width, panel.panel.height)
+        _draw_panel(drawing, place, panel, recording.ticks.t, end, is_last=number == len(panels) - 1)
+    return drawing
 
 
 def build_panels(recording: Recording) -> tuple[ReadingPanel, ...]:
@@ -135,38 +112,36 @@ def _format_subtitle(trial: TrialResult) -> str:
     return f"trial {trial.index + 1}; {', '.join(noise) or 'no noise'}; one reading every {tick}"
 
 
-def _draw_strips(axes: Axes, strips: Sequence[Strip], end: float) -> None:
-    axes.set_xlim(0, end)
-    axes.set_ylim(-0.6, len(strips) - 0.4)
-    axes.set_xticks([])
-    axes.set_yticks(range(len(strips)), [strip.label for strip in reversed(strips)])
-    set_tick_size(axes, 7.5)
-    axes.tick_params(axis="y", length=0)
+def _draw_strips(drawing: Drawing, place: Rectangle, strips: Sequence[Strip], end: float) -> None:
+    panel = PlotPanel(drawing, place, (0, end), (-0.6, len(strips) - 0.4))
+    labels = [strip.label for strip in reversed(strips)]
+    panel.add_y_axis(range(len(strips)), labels, tick_length=0)
     for row, strip in enumerate(reversed(strips)):
-        axes.axhline(row, color=RULE, linewidth=0.6, zorder=0)
-        times = strip.times[:_MAX_MARKS]
-        axes.plot(times, [row] * len(times), strip.marker, color=strip.colour, markersize=4.5, markeredgewidth=0,
-                  clip_on=False)  # fmt: skip
-    for side in axes.spines.values():
-        side.set_visible(False)
+        panel.add_line([(0, row), (end, row)], Stroke(RULE, 0.6))
+        marks = [(time, row) for time in strip.times[:_MAX_MARKS]]
+        panel.add_marks(marks, MarkerStyle(strip.marker), 4.5, fill=strip.colour, clipped=False)
 
 
-def _draw_panel(axes: Axes, panel: ReadingPanel, times: NDArray[np.float64], end: float) -> None:
-    axes.set_xlim(0, end)
-    for curve, colour, dashes, width in zip(panel.curves, (LEFT, RIGHT), ((), (3.2, 1.2)), (1.1, 1.3), strict=False):
-        axes.plot(times, _clip_readings(curve.values), color=colour, linewidth=width, dashes=dashes or (None, None))
-    limits = panel.panel.limits or _compute_limits(panel)
-    axes.set_ylim(*limits)
-    if panel.panel.marks:
-        axes.set_yticks(panel.panel.marks)
-    else:
-        axes.locator_params(axis="y", nbins=4)
-    axes.grid(axis="both", color=RULE, linewidth=0.5, alpha=0.7)
-    axes.spines["top"].set_visible(False)
-    axes.spines["right"].set_visible(False)
+def _draw_panel(
+    drawing: Drawing, place: Rectangle, readings: ReadingPanel, times: NDArray[np.float64], end: float, *, is_last: bool
+) -> None:
+    """Draw one panel with its title; the last one has the labels of the time axis."""
+    panel = PlotPanel(drawing, place, (0, end), readings.panel.limits or _compute_limits(readings))
+    x_ticks = panel.choose_x_ticks()
+    y_ticks = list(readings.panel.marks) or panel.choose_y_ticks(4)
+    panel.add_grid(x_ticks, y_ticks)
+    for curve, stroke in zip(readings.curves, _CURVE_STROKES, strict=False):
+        panel.add_line(np.column_stack((times, _clip_readings(curve.values))), stroke)
+    panel.add_frame(("left", "bottom"))
+    panel.add_x_axis(x_ticks, labelled=is_last, label="simulated time, s" if is_last else "")
+    panel.add_y_axis(y_ticks)
+    title_y = place.bottom + place.height + 0.045
+    drawing.add_text(_LEFT_EDGE, title_y, readings.panel.title, size=8, bold=True)
+    if len(readings.curves) > 1:
+        _label_curves(drawing, readings, title_y)
     if not len(times):
-        axes.text(0.5, 0.5, "no time passed", transform=axes.transAxes, ha="center", va="center", color=FAINT,
-                  font=load_font(8))  # fmt: skip
+        x, y = place.left + place.width / 2, place.bottom + place.height / 2
+        drawing.add_text(x, y, "no time passed", size=8, colour=FAINT, horizontal="center", vertical="center")
 
 
 def _compute_limits(panel: ReadingPanel) -> tuple[float, float]:
@@ -185,13 +160,8 @@ def _clip_readings(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.clip(values, -_MAX_READING, _MAX_READING)
 
 
-def _label_curves(figure: Figure, panel: ReadingPanel, y: float) -> None:
+def _label_curves(drawing: Drawing, panel: ReadingPanel, y: float) -> None:
     right_edge = WIDTH - _RIGHT_EDGE
-    width, height = figure.get_size_inches()
-    for curve, text_x, colour in zip(panel.curves, (right_edge - 0.86, right_edge - 0.30), (LEFT, RIGHT), strict=True):
-        write_text(figure, text_x, y, curve.label, size=8, colour=INK)
-        ends = [(text_x - 0.25) / width, (text_x - 0.05) / width]
-        line = Line2D(ends, [(y + 0.045) / height] * 2, color=colour, linewidth=1.5)
-        if colour == RIGHT:
-            line.set_dashes((2.6, 1.0))
-        figure.add_artist(line)
+    for curve, text_x, stroke in zip(panel.curves, (right_edge - 0.86, right_edge - 0.30), _CURVE_STROKES, strict=True):
+        drawing.add_text(text_x, y, curve.label, size=8)
+        drawing.add_line([(text_x - 0.25, y + 0.045), (text_x - 0.05, y + 0.045)], stroke)

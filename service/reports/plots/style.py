@@ -1,25 +1,20 @@
-"""The common style of plots: page size, type, colours that also differ in lightness, and PNG output.
+"""The common style of plots: page size, type, and colours that also differ in lightness.
 
 It holds no state and never uses pyplot, so plots are the same in any process.
 """
 
 from __future__ import annotations
 
-import io
 import math
 import textwrap
 from functools import lru_cache
 from pathlib import Path
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, get_font
 from matplotlib.text import Text
-from numpy.typing import NDArray
-from PIL import Image
 
 from service.reports.display_text import to_one_line
 from service.reports.plots.plot import DPI
@@ -29,9 +24,9 @@ matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDe
 
 #: Inches. A phone shows it 390 pixels wide, with the smallest type 11 pixels high.
 WIDTH = 3.9
-_MIN_FONT_SIZE = 8.0  # points
-_CHARACTERS = 15.2  # characters of a subtitle in an inch
-_MAX_PIXELS = 6_000_000
+MIN_FONT_SIZE = 8.0  # points
+CHARACTERS = 15.2  # characters of a subtitle in an inch
+MAX_PIXELS = 6_000_000
 
 INK = "#1c2630"
 FAINT = "#5d6873"
@@ -42,9 +37,18 @@ PEN = "#e79b9b"
 FAULT = "#a3162a"
 SAID = "#3f7d3c"
 SECOND_ROBOT = "#7a3e9d"
+OFF_THE_FLOOR = "#a3aab1"
 
 FONT_FILE = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-_BOLD = FONT_FILE.with_name("DejaVuSans-Bold.ttf")
+BOLD_FONT_FILE = FONT_FILE.with_name("DejaVuSans-Bold.ttf")
+
+
+def lighten(value: int) -> int:
+    """Return a channel of a floor's colour, 0 to 255, as plots show it.
+
+    A path over black stays visible, and printing saves ink.
+    """
+    return round(72 + value * (183 / 255))
 
 
 def create_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
@@ -52,10 +56,10 @@ def create_figure(height: float, title: str, subtitle: str = "", width: float = 
 
     Very large figures get a lower resolution to save memory.
     """
-    dpi = min(DPI, math.sqrt(_MAX_PIXELS / (width * height)))
+    dpi = min(DPI, math.sqrt(MAX_PIXELS / (width * height)))
     figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     write_text(figure, 0.08, height - 0.08, to_one_line(title, int(width * 10)), size=10, bold=True, va="top")
-    lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * _CHARACTERS), max_lines=2, placeholder=" …")
+    lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * CHARACTERS), max_lines=2, placeholder=" …")
     for number, line in enumerate(lines):
         write_text(figure, 0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, va="top")
     return figure
@@ -99,13 +103,13 @@ def add_axes(figure: Figure, left: float, bottom: float, width: float, height: f
 
 def set_tick_size(axes: Axes, size: float = 8) -> None:
     """Set the size of the tick labels, in points."""
-    axes.tick_params(labelsize=max(size, _MIN_FONT_SIZE), labelfontfamily="DejaVu Sans")
+    axes.tick_params(labelsize=max(size, MIN_FONT_SIZE), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
 def load_font(size: float, *, bold: bool = False) -> FontProperties:
     """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
-    return FontProperties(fname=str(_BOLD if bold else FONT_FILE), size=max(size, _MIN_FONT_SIZE))
+    return FontProperties(fname=str(BOLD_FONT_FILE if bold else FONT_FILE), size=max(size, MIN_FONT_SIZE))
 
 
 def replace_missing_glyphs(text: str) -> str:
@@ -116,37 +120,7 @@ def replace_missing_glyphs(text: str) -> str:
     )
 
 
-def render_png(figure: Figure) -> bytes:
-    """Return the figure as a PNG of at most 256 colours, without metadata; equal figures give equal bytes."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # type: ignore[no-untyped-call]
-    stream = io.BytesIO()
-    _reduce_colours(np.asarray(canvas.buffer_rgba())).save(stream, "PNG", compress_level=6, dpi=(DPI, DPI))  # type: ignore[no-untyped-call]
-    return stream.getvalue()
-
-
-def _reduce_colours(rgba: NDArray[np.uint8]) -> Image.Image:
-    """Return the image with at most 256 colours, chosen by median cut.
-
-    Plots are flat: their pixels come in runs. Each of their few thousand colours is examined once, weighted by the root
-    of its frequency, which costs a fifth of examining every pixel.
-    """
-    height, width = rgba.shape[:2]
-    pixels = np.ascontiguousarray(rgba).view(np.uint32).ravel()
-    starts = np.flatnonzero(np.concatenate(([True], pixels[1:] != pixels[:-1])))
-    lengths = np.diff(starts, append=pixels.size)
-    colours, colour_indices = np.unique(pixels[starts], return_inverse=True)
-    weights = np.ceil(np.sqrt(np.bincount(colour_indices, lengths))).astype(np.int64)
-    sample = np.repeat(colours, weights).view(np.uint8).reshape(1, -1, 4)[:, :, :3]
-    reduced_image = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    first_samples = np.cumsum(weights) - weights
-    indices = np.asarray(reduced_image).ravel()[first_samples][colour_indices]
-    image = Image.fromarray(np.repeat(indices, lengths).reshape(height, width))
-    image.putpalette(reduced_image.getpalette() or [])
-    return image
-
-
 @lru_cache(maxsize=1)
 def _load_known_characters() -> frozenset[int]:
     # Both weights are used, and the bold one has fewer characters.
-    return frozenset(get_font(str(FONT_FILE)).get_charmap()) & frozenset(get_font(str(_BOLD)).get_charmap())
+    return frozenset(get_font(str(FONT_FILE)).get_charmap()) & frozenset(get_font(str(BOLD_FONT_FILE)).get_charmap())

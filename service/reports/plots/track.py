@@ -8,39 +8,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.markers import MarkerStyle
 
 from models.intervals import compute_wilson_interval
 from service.grading.grade import Prediction, TrialResult
-from service.reports.plots.curve import Curve, draw_curve
-from service.reports.plots.path import Pixels, Viewport, draw_floor_part
-from service.reports.plots.style import (
-    FAINT,
-    FAULT,
-    HEAD,
-    INK,
-    LEFT,
-    RULE,
-    SAID,
-    WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
-    set_tick_size,
-    write_text,
-)
+from service.reports.plots.curve import Curve, choose_limits, draw_curve
+from service.reports.plots.drawing import Drawing, Rectangle, Stroke, create_drawing
+from service.reports.plots.floor_image import Viewport, draw_floor_part
+from service.reports.plots.panel import Panel
+from service.reports.plots.style import FAINT, FAULT, HEAD, INK, LEFT, SAID, WIDTH
 from service.reports.plots.track_images import TrackImage, collect_track_images, find_tracks, find_worst_track
+from sim.floors.canvas import Pixels
 
 _LEFT_EDGE, _RIGHT_EDGE, _FOOT = 0.62, 0.14, 0.74
 _ALONG, _GAP = 1.15, 0.62  # inches: the curve, and the gap to the floor
 _MAX_BINS = 12
 _MARGIN = 60.0
+_CIRCLE, _CROSS, _SQUARE = MarkerStyle("o"), MarkerStyle("x"), MarkerStyle("s")
 
 
 def draw_track(
     predictions: Sequence[Prediction], trials: Sequence[TrialResult], title: str, floor: Pixels | None
-) -> Figure:
+) -> Drawing:
     """Draw the worst trial's images over its floor, and the fraction correct along the path over all tracks."""
     track_trials = find_tracks(predictions, trials)
     images_by_trial = {index: collect_track_images(predictions, trials, index) for index in track_trials}
@@ -54,18 +43,18 @@ def draw_track(
     trial_word = "trial" if len(track_trials) == 1 else "trials"
     summary = f"{correct_count} of n = {len(images)} images correct, {len(track_trials)} {trial_word}"
     location = f"floor: {trial.scenario}, trial {trial.index + 1}"
-    figure = create_figure(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{summary}; {location}")
-    track_axes = add_axes(figure, _LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
-    draw_floor_part(track_axes, floor, view)
-    track_axes.set_xlim(view.left, view.right)
-    track_axes.set_ylim(view.bottom, view.top)
-    _draw_images(track_axes, images_by_trial[worst_trial], 0.045 * view.width)
-    track_axes.set_xlabel("x, mm", font=load_font(8), labelpad=1)
-    track_axes.set_ylabel("y, mm", font=load_font(8), labelpad=4)
-    _draw_accuracy_curve(add_axes(figure, _LEFT_EDGE, _FOOT, width, _ALONG), images)
-    write_text(figure, 0.08, 0.23, "beside each place: ○ correct  ✗ wrong  □ no answer", size=8, colour=FAINT)
-    write_text(figure, 0.08, 0.09, "band: 95 % interval; above it: n", size=8, colour=FAINT)
-    return figure
+    drawing = create_drawing(HEAD + height + _GAP + _ALONG + _FOOT, title, f"{summary}; {location}")
+    place = Rectangle(_LEFT_EDGE, _FOOT + _ALONG + _GAP, width, height)
+    panel = Panel(drawing, place, (view.left, view.right), (view.bottom, view.top))
+    draw_floor_part(panel, floor, view)
+    _draw_images(panel, images_by_trial[worst_trial], 0.045 * view.width)
+    panel.add_frame()
+    panel.add_x_axis(label="x, mm")
+    panel.add_y_axis(label="y, mm")
+    _draw_accuracy_curve(drawing, Rectangle(_LEFT_EDGE, _FOOT, width, _ALONG), images)
+    drawing.add_text(0.08, 0.23, "beside each place: ○ correct  ✗ wrong  □ no answer", size=8, colour=FAINT)
+    drawing.add_text(0.08, 0.09, "band: 95 % interval; above it: n", size=8, colour=FAINT)
+    return drawing
 
 
 def compute_accuracy_curve(images: Sequence[TrackImage]) -> Curve:
@@ -88,49 +77,40 @@ def compute_accuracy_curve(images: Sequence[TrackImage]) -> Curve:
     )
 
 
-def _draw_images(axes: Axes, images: Sequence[TrackImage], offset: float) -> None:
+def _draw_images(panel: Panel, images: Sequence[TrackImage], offset: float) -> None:
     """Draw the marks ``offset`` mm to the robot's left of the sensor, so that the floor stays visible."""
-    axes.plot(
-        [item.x for item in images], [item.y for item in images], color=LEFT, linewidth=0.8, linestyle=":", zorder=3
-    )
-    marks = []
+    panel.add_line([(item.x, item.y) for item in images], Stroke(LEFT, 0.8, (0.8, 1.3)))
+    places = []
     for item in images:
         angle = math.radians(item.heading + 90)
-        x, y = item.x + offset * math.cos(angle), item.y + offset * math.sin(angle)
-        axes.plot([item.x, x], [item.y, y], color=FAINT, linewidth=0.5, zorder=3)
-        marks.append((x, y, *_choose_mark(item)))
-    for x, y, marker, _ in marks:
-        _draw_mark(axes, x, y, marker, "white", 5.4, 2.2)
-    for x, y, marker, colour in marks:
-        _draw_mark(axes, x, y, marker, colour, 4.4, 1.2)
+        place = (item.x + offset * math.cos(angle), item.y + offset * math.sin(angle))
+        panel.add_line([(item.x, item.y), place], Stroke(FAINT, 0.5))
+        places.append(place)
+    for place, item in zip(places, images, strict=True):
+        panel.add_marks([place], _choose_mark(item)[0], 5.4, edge=Stroke("white", 2.2))
+    for place, item in zip(places, images, strict=True):
+        marker, colour = _choose_mark(item)
+        panel.add_marks([place], marker, 4.4, edge=Stroke(colour, 1.2))
 
 
-def _choose_mark(item: TrackImage) -> tuple[str, str]:
+def _choose_mark(item: TrackImage) -> tuple[MarkerStyle, str]:
     """Return marker and colour. Each alone identifies the result."""
     if item.right:
-        return "o", SAID
-    return ("x", FAULT) if item.answered else ("s", INK)
+        return _CIRCLE, SAID
+    return (_CROSS, FAULT) if item.answered else (_SQUARE, INK)
 
 
-def _draw_mark(axes: Axes, x: float, y: float, marker: str, colour: str, size: float, width: float) -> None:
-    axes.plot(
-        [x], [y], marker=marker, markersize=size, markerfacecolor="none", markeredgecolor=colour,
-        markeredgewidth=width, linestyle="none", zorder=5,
-    )  # fmt: skip
-
-
-def _draw_accuracy_curve(axes: Axes, images: Sequence[TrackImage]) -> None:
+def _draw_accuracy_curve(drawing: Drawing, place: Rectangle, images: Sequence[TrackImage]) -> None:
     curve = compute_accuracy_curve(images)
-    axes.set_ylim(-0.04, 1.16)
-    axes.set_yticks([0, 0.5, 1])
-    axes.grid(axis="y", color=RULE, linewidth=0.5)
-    axes.set_axisbelow(True)
-    draw_curve(axes, curve)
+    panel = Panel(drawing, place, choose_limits(curve.x), (-0.04, 1.16))
+    y_ticks = (0, 0.5, 1)
+    panel.add_grid((), y_ticks, opacity=1)
+    draw_curve(panel, curve)
     for x, count in zip(curve.x, curve.n, strict=True):
-        axes.text(x, 1.07, str(count), font=load_font(7.5), color=FAINT, ha="center", va="bottom", clip_on=False)
-    axes.set_xlabel("distance driven, mm", font=load_font(8), labelpad=1)
-    axes.set_ylabel("accuracy", font=load_font(8), labelpad=3)
-    set_tick_size(axes)
+        panel.add_text(x, 1.07, str(count), size=7.5, colour=FAINT, horizontal="center", vertical="bottom")
+    panel.add_frame()
+    panel.add_x_axis(label="distance driven, mm")
+    panel.add_y_axis(y_ticks, label="accuracy")
 
 
 def _choose_viewport(images: Sequence[TrackImage]) -> Viewport:

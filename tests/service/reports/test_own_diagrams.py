@@ -20,7 +20,7 @@ from service.reports.plots.diagram_parts import Highlights
 from service.reports.plots.grade_plots import draw_all_plots, list_plots
 from service.reports.plots.message_counts import MessageCount, build_block_diagram, count_messages
 from service.reports.plots.own_diagrams import list_own_diagrams
-from service.reports.plots.style import render_png
+from service.reports.plots.png import render_png
 from service.reports.view import build_staff_view, build_student_view
 from sim.recording import Call, Message
 from submissions.diagram import DiagramKind

@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.text import Text
 from PIL import Image as Pixels
 
 import report_builders as build
@@ -23,10 +21,6 @@ from service.reports.plots.track_images import collect_track_images, find_tracks
 from service.reports.view import build_student_view
 from sim.floors import build_floor
 from sim.recording import Image, Pose
-
-
-def _texts(figure: Figure) -> list[str]:
-    return [text.get_text() for text in figure.findobj(Text) if isinstance(text, Text) and text.get_text()]
 
 
 def _moving() -> Grade:
@@ -61,7 +55,7 @@ def test_recognition_has_its_plots() -> None:
 def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
     accuracy = Accuracy(0.5, 0.2, 0.8, 8, ("a", "b"), (("a", "a", 3), ("a", "b", 1), ("b", "b", 1), ("b", None, 3)))
     result = CriterionResult("c", "C", build.shape_grade().marks, build.shape_grade().marks, "")
-    shown = _texts(draw_confusion(result, accuracy, "t"))
+    shown = draw_confusion(result, accuracy, "t").texts
     assert {"precision", "recall", ".75", ".25", ".50", "1"} <= set(shown)  # b: recall 1 of 4, precision 1 of 2
     assert any("n = 8 images" in text for text in shown)
 
@@ -73,7 +67,7 @@ def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     assert found.like_truth is None
     assert found.like_answer is not None
     assert found.like_answer.truth == "diamond"
-    shown = _texts(draw_misread([found], 6, "t"))
+    shown = draw_misread([found], 6, "t").texts
     assert {"misread", "correct,\nsame truth", "correct,\nsame answer", "none", "5. ✗ wrong"} <= set(shown)
     assert any("1 misread of n = 6 images" in text for text in shown)
     # Of two correct images of a class, the nearer one is shown.
@@ -95,7 +89,7 @@ def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     curve = compute_accuracy_curve([*collect_track_images(predictions, grade.trials, 0), *images])
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = _texts(draw_track(predictions, grade.trials, "t", build_floor("Simple_Shapes").pixels))
+    shown = draw_track(predictions, grade.trials, "t", build_floor("Simple_Shapes").pixels).texts
     assert {"x, mm", "y, mm", "distance driven, mm", "accuracy"} <= set(shown)
     assert any(f"of n = {len(predictions)} images correct, 2 trials" in text for text in shown)
 

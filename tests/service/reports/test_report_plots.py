@@ -19,6 +19,7 @@ from service.reports.plots.grade_plots import draw_all_plots, list_plots
 from service.reports.plots.message_counts import build_sequence_diagram
 from service.reports.plots.path import draw_path
 from service.reports.plots.plot import DPI
+from service.reports.plots.png import render_png
 from service.reports.plots.sensor import build_panels, build_strips, draw_sensors
 from service.reports.plots.sensor_images import crop_focus, select_predictions, to_rgb_image
 from service.reports.plots.sequence import Gap, Step, build_conversation
@@ -93,7 +94,7 @@ def test_readings_of_any_size_are_drawn(positions: tuple[float, float]) -> None:
     ticks = trial.recording.ticks
     left, right = (np.full(len(ticks), each) for each in positions)
     recording = replace(trial.recording, ticks=replace(ticks, left_position=left, right_position=right))
-    draw_sensors(replace(trial, recording=recording), "t").savefig(io.BytesIO())
+    assert render_png(draw_sensors(replace(trial, recording=recording), "t"))
 
 
 def test_a_plot_that_cannot_be_drawn_is_an_image_with_a_sentence(
@@ -130,9 +131,9 @@ def test_hostile_text_is_drawn_not_interpreted() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_trials_that_hardly_began(count: int) -> None:
     trial = TrialResult("short", 0, 1, 0, 0, "visible", build.line_follower_recording(count))
-    for figure in (draw_path(trial, "t", None), draw_sensors(trial, "t")):
-        figure.draw_without_rendering()
-    assert ("no time passed" in _texts(draw_sensors(trial, "t"))) is (count == 0)
+    for drawing in (draw_path(trial, "t", None), draw_sensors(trial, "t")):
+        assert render_png(drawing)
+    assert ("no time passed" in draw_sensors(trial, "t").texts) is (count == 0)
 
 
 def test_a_path_that_leaves_the_floor_says_so() -> None:
@@ -143,13 +144,13 @@ def test_a_path_that_leaves_the_floor_says_so() -> None:
         end=Pose(9000, 800, 0),
     )
     ticks = replace(far.ticks, y=np.full(90, 800.0))
-    shown = _texts(draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None))
+    shown = draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None).texts
     assert "the path continues outside this image" in shown
     draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # no finite tick except the start
 
 
 def test_path_tells_units_start_end_and_images() -> None:
-    shown = _texts(draw_path(build.shape_grade().trials[4], "Shapes: path", None))
+    shown = draw_path(build.shape_grade().trials[4], "Shapes: path", None).texts
     assert {"x, mm", "y, mm", "start", "end", "image sent", "Shapes: path", "1"} <= set(shown)
     assert any("from (520, 900) heading 0°" in text for text in shown)
 
@@ -161,7 +162,7 @@ def test_sensor_panels_and_events() -> None:
     assert distance.curves[0].values[0] == recording.ticks.ultrasonic[0] / 10
     assert np.array_equal(wheels.curves[1].values, recording.ticks.right_position)
     assert [strip.label for strip in build_strips(recording)] == ["said", "touch"]
-    shown = _texts(draw_sensors(build.line_follower_grade().trials[1], "t"))
+    shown = draw_sensors(build.line_follower_grade().trials[1], "t").texts
     assert {"Ultrasonic, cm", "Reflected light, red 0–255", "simulated time, s"} <= set(shown)
 
 
@@ -251,7 +252,7 @@ def test_confusion_counts_totals_and_missing_answers() -> None:
     assert table.answers == ("a", "b", "zebra", "no answer")
     assert table.counts == ((2, 0, 0, 0), (0, 0, 1, 1))
     assert table.totals == (2, 2)
-    shown = _texts(draw_confusion(build.shape_grade().criteria[0], accuracy, "t"))
+    shown = draw_confusion(build.shape_grade().criteria[0], accuracy, "t").texts
     assert any("accuracy 0.50, 95 % interval 0.20 to 0.80, n = 4" in text for text in shown)
     assert "no answer" in shown
 

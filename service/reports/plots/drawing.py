@@ -1,0 +1,173 @@
+"""A drawing as a list of lines, areas, marks, images and texts, in inches from its lower left corner.
+
+``panel.py`` draws data with axes on it, and ``raster.py`` turns it into pixels. Later items cover earlier ones.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from matplotlib.markers import MarkerStyle
+from numpy.typing import NDArray
+
+from service.reports.display_text import to_one_line
+from service.reports.plots.style import CHARACTERS, FAINT, INK, MIN_FONT_SIZE, WIDTH
+
+Points = NDArray[np.float64]
+Horizontal = Literal["left", "center", "right"]
+#: ``middle`` is the middle of capitals and digits, ``center`` that of the whole line.
+Vertical = Literal["baseline", "top", "center", "middle", "bottom"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A rectangle, inches."""
+
+    left: float
+    bottom: float
+    width: float
+    height: float
+
+    @property
+    def corners(self) -> Points:
+        """The four corners, counter-clockwise from the lower left one."""
+        right, top = self.left + self.width, self.bottom + self.height
+        return np.array([(self.left, self.bottom), (right, self.bottom), (right, top), (self.left, top)])
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """The style of a line: width and dashes in points, opacity from 0 to 1."""
+
+    colour: str
+    width: float
+    dashes: tuple[float, ...] = ()
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line through points, shape (n, 2)."""
+
+    points: Points
+    stroke: Stroke
+    clip: Rectangle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A closed polygon, shape (n, 2), with a fill, an edge, or both."""
+
+    points: Points
+    fill: str | None = None
+    edge: Stroke | None = None
+    opacity: float = 1.0  # of the fill
+    hatched: bool = False
+    clip: Rectangle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """One marker at each of several points, shape (n, 2). ``size`` is in points."""
+
+    points: Points
+    marker: MarkerStyle
+    size: float
+    fill: str | None
+    edge: Stroke | None = None
+    clip: Rectangle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An RGB image, shape (rows, columns, 3), whose pixels fill a rectangle, the first row at the top."""
+
+    pixels: NDArray[np.uint8]
+    place: Rectangle
+    clip: Rectangle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Text of one or more lines. ``x`` and ``y`` are the place of its anchor, ``rotation`` is 0 or 90 degrees."""
+
+    text: str
+    x: float
+    y: float
+    size: float  # points
+    colour: str = INK
+    bold: bool = False
+    horizontal: Horizontal = "left"
+    vertical: Vertical = "baseline"
+    rotation: Literal[0, 90] = 0
+    background: str | None = None  # of a box behind the text
+    clip: Rectangle | None = None
+
+
+Item = Line | Area | Marks | Picture | Words
+
+
+@dataclass(slots=True)
+class Drawing:
+    """A white page of ``width`` x ``height`` inches and the items on it, in the order of drawing."""
+
+    width: float
+    height: float
+    items: list[Item] = field(default_factory=list)
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts on the drawing, in order."""
+        return [item.text for item in self.items if isinstance(item, Words)]
+
+    def add_text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        *,
+        size: float = 8.5,
+        colour: str = INK,
+        bold: bool = False,
+        horizontal: Horizontal = "left",
+        vertical: Vertical = "baseline",
+        rotation: Literal[0, 90] = 0,
+        background: str | None = None,
+        clip: Rectangle | None = None,
+    ) -> None:
+        """Add text, in a size that a phone can show."""
+        size = max(size, MIN_FONT_SIZE)
+        self.items.append(
+            Words(text, x, y, size, colour, bold, horizontal, vertical, rotation, background, clip)
+        )  # fmt: skip
+
+    def add_line(self, points: Iterable[Sequence[float]], stroke: Stroke) -> None:
+        """Add a line through points."""
+        self.items.append(Line(np.array(list(points)), stroke))
+
+    def add_marks(
+        self, points: Iterable[Sequence[float]], marker: MarkerStyle, size: float, fill: str | None, edge: Stroke | None
+    ) -> None:
+        """Add a marker at each of the points."""
+        self.items.append(Marks(np.array(list(points)), marker, size, fill, edge))
+
+    def add_rectangle(
+        self, place: Rectangle, *, fill: str | None = None, edge: Stroke | None = None, hatched: bool = False
+    ) -> None:
+        """Add a rectangle."""
+        self.items.append(Area(place.corners, fill, edge, hatched=hatched))
+
+
+def create_drawing(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Drawing:
+    """Return a page with its title and subtitle at the top left, in ``HEAD`` inches."""
+    drawing = Drawing(width, height)
+    title_line = to_one_line(title, int(width * 10))
+    drawing.add_text(0.08, height - 0.08, title_line, size=10, bold=True, vertical="top")
+    lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * CHARACTERS), max_lines=2, placeholder=" …")
+    for number, line in enumerate(lines):
+        drawing.add_text(0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, vertical="top")
+    return drawing

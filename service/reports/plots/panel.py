@@ -1,0 +1,228 @@
+"""A rectangle of a drawing with coordinates of its own: data, axes with ticks, grid and frame.
+
+Positions of ticks come from Matplotlib's locators.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from matplotlib.markers import MarkerStyle
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from service.reports.plots.drawing import (
+    Area,
+    Drawing,
+    Horizontal,
+    Line,
+    Marks,
+    Picture,
+    Points,
+    Rectangle,
+    Stroke,
+    Vertical,
+)
+from service.reports.plots.style import INK, MIN_FONT_SIZE, RULE
+
+_TICK_LENGTH, _TICK_GAP = 3 / 72, 2 / 72  # inches
+_FRAME = Stroke(RULE, 0.8)
+_TICK_STEPS = (1, 2, 2.5, 5, 10)
+_MAX_TICKS = 9
+_LONGEST_NUMBER = 1e7  # larger ones are written with a power of ten
+_ALL_SIDES = ("left", "bottom", "right", "top")
+
+Side = Literal["left", "bottom", "right", "top"]
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """The part ``place`` of a drawing, whose edges have the coordinates ``x_limits`` and ``y_limits``."""
+
+    drawing: Drawing
+    place: Rectangle
+    x_limits: tuple[float, float]
+    y_limits: tuple[float, float]
+
+    def to_inches(self, points: Iterable[Sequence[float]] | Points) -> Points:
+        """Return the points, shape (n, 2), as inches on the drawing."""
+        place = self.place
+        origin = np.array((self.x_limits[0], self.y_limits[0]))
+        size = np.array((self.x_limits[1], self.y_limits[1])) - origin
+        data = np.asarray(points if isinstance(points, np.ndarray) else list(points), dtype=np.float64)
+        scale = np.array((place.width, place.height)) / size
+        return np.asarray((data.reshape(-1, 2) - origin) * scale + (place.left, place.bottom))
+
+    def add_line(self, points: Iterable[Sequence[float]] | Points, stroke: Stroke) -> None:
+        """Add a line, cut at the panel's edges."""
+        self.drawing.items.append(Line(self.to_inches(points), stroke, self.place))
+
+    def add_area(
+        self,
+        points: Iterable[Sequence[float]] | Points,
+        *,
+        fill: str | None = None,
+        edge: Stroke | None = None,
+        opacity: float = 1.0,
+        hatched: bool = False,
+    ) -> None:
+        """Add a polygon, cut at the panel's edges."""
+        self.drawing.items.append(Area(self.to_inches(points), fill, edge, opacity, hatched, self.place))
+
+    def add_rectangle(
+        self,
+        corner: tuple[float, float],
+        width: float,
+        height: float,
+        *,
+        fill: str | None = None,
+        edge: Stroke | None = None,
+        hatched: bool = False,
+    ) -> None:
+        """Add a rectangle from its corner with the lowest coordinates."""
+        self.add_area(Rectangle(*corner, width, height).corners, fill=fill, edge=edge, hatched=hatched)
+
+    def add_marks(
+        self,
+        points: Iterable[Sequence[float]] | Points,
+        marker: MarkerStyle,
+        size: float,
+        *,
+        fill: str | None = None,
+        edge: Stroke | None = None,
+        clipped: bool = True,
+    ) -> None:
+        """Add a marker at each of the points."""
+        clip = self.place if clipped else None
+        self.drawing.items.append(Marks(self.to_inches(points), marker, size, fill, edge, clip))
+
+    def add_picture(self, pixels: NDArray[np.uint8], left: float, bottom: float, right: float, top: float) -> None:
+        """Add an RGB image between the coordinates, cut at the panel's edges."""
+        (x0, y0), (x1, y1) = self.to_inches([(left, bottom), (right, top)])
+        place = Rectangle(min(x0, x1), min(y0, y1), abs(x1 - x0), abs(y1 - y0))
+        self.drawing.items.append(Picture(pixels, place, self.place))
+
+    def add_text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        *,
+        size: float = 8.5,
+        colour: str = INK,
+        bold: bool = False,
+        horizontal: Horizontal = "left",
+        vertical: Vertical = "baseline",
+        rotation: Literal[0, 90] = 0,
+        background: str | None = None,
+        clipped: bool = False,
+    ) -> None:
+        """Add text."""
+        ((left, bottom),) = self.to_inches([(x, y)])
+        self.drawing.add_text(
+            float(left), float(bottom), text, size=size, colour=colour, bold=bold, horizontal=horizontal,
+            vertical=vertical, rotation=rotation, background=background, clip=self.place if clipped else None,
+        )  # fmt: skip
+
+    def fill(self, colour: str) -> None:
+        """Colour the panel."""
+        self.drawing.add_rectangle(self.place, fill=colour)
+
+    def add_frame(self, sides: Sequence[Side] = _ALL_SIDES) -> None:  # type: ignore[assignment]
+        """Draw edges of the panel."""
+        corners = dict(zip(("left", "bottom", "right", "top"), self._get_edges(), strict=True))
+        for side in sides:
+            self.drawing.add_line(corners[side], _FRAME)
+
+    def _get_edges(self) -> tuple[Points, Points, Points, Points]:
+        low_left, low_right, top_right, top_left = self.place.corners
+        return (
+            np.array((low_left, top_left)),
+            np.array((low_left, low_right)),
+            np.array((low_right, top_right)),
+            np.array((top_left, top_right)),
+        )
+
+    def add_x_axis(
+        self, ticks: Sequence[float] | None = None, *, label: str = "", labelled: bool = True, size: float = 8
+    ) -> None:
+        """Draw ticks below the panel, at round numbers if ``ticks`` is None, and the name of the axis."""
+        ticks = self.choose_x_ticks() if ticks is None else ticks
+        place = self.place
+        labels = format_ticks(ticks) if labelled else [""] * len(ticks)
+        for tick, text in zip(ticks, labels, strict=True):
+            x = float(self.to_inches([(tick, self.y_limits[0])])[0, 0])
+            self.drawing.add_line([(x, place.bottom), (x, place.bottom - _TICK_LENGTH)], _FRAME)
+            if text:
+                y = place.bottom - _TICK_LENGTH - _TICK_GAP
+                self.drawing.add_text(x, y, text, size=size, horizontal="center", vertical="top")
+        if label:
+            y = place.bottom - _TICK_LENGTH - _TICK_GAP - max(size, MIN_FONT_SIZE) / 72 - 0.03
+            self.drawing.add_text(place.left + place.width / 2, y, label, horizontal="center", vertical="top")
+
+    def add_y_axis(
+        self,
+        ticks: Sequence[float] | None = None,
+        labels: Sequence[str] | None = None,
+        *,
+        label: str = "",
+        tick_length: float = _TICK_LENGTH,
+        size: float = 8,
+    ) -> None:
+        """Draw ticks at the left of the panel, at round numbers if ``ticks`` is None, and the name of the axis."""
+        ticks = self.choose_y_ticks() if ticks is None else ticks
+        place = self.place
+        labels = format_ticks(ticks) if labels is None else labels
+        for tick, text in zip(ticks, labels, strict=True):
+            y = float(self.to_inches([(self.x_limits[0], tick)])[0, 1])
+            if tick_length:
+                self.drawing.add_line([(place.left, y), (place.left - tick_length, y)], _FRAME)
+            x = place.left - tick_length - _TICK_GAP
+            self.drawing.add_text(x, y, text, size=size, horizontal="right", vertical="middle")
+        if label:
+            widest = max((len(text) for text in labels), default=0) * 0.6 * max(size, MIN_FONT_SIZE) / 72
+            x = max(place.left - tick_length - _TICK_GAP - widest - 0.03, 0.14)
+            self.drawing.add_text(x, place.bottom + place.height / 2, label, horizontal="center", rotation=90)
+
+    def choose_x_ticks(self) -> list[float]:
+        """Return round numbers along the x axis, as many as fit."""
+        return choose_ticks(self.x_limits, int(self.place.width * 72 / (MIN_FONT_SIZE * 3)))
+
+    def choose_y_ticks(self, max_intervals: int | None = None) -> list[float]:
+        """Return round numbers along the y axis, as many as fit or as limited."""
+        return choose_ticks(self.y_limits, max_intervals or int(self.place.height * 72 / (MIN_FONT_SIZE * 2)))
+
+    def add_grid(self, x_ticks: Sequence[float], y_ticks: Sequence[float], opacity: float = 0.7) -> None:
+        """Draw thin lines through the ticks of both axes."""
+        stroke = Stroke(RULE, 0.5, opacity=opacity)
+        for x in x_ticks:
+            self.add_line([(x, self.y_limits[0]), (x, self.y_limits[1])], stroke)
+        for y in y_ticks:
+            self.add_line([(self.x_limits[0], y), (self.x_limits[1], y)], stroke)
+
+
+def choose_ticks(limits: tuple[float, float], max_intervals: int) -> list[float]:
+    """Return round numbers within ascending or descending ``limits``."""
+    low, high = sorted(limits)
+    intervals = min(max(max_intervals, 1), _MAX_TICKS)
+    ticks = MaxNLocator(intervals, steps=_TICK_STEPS).tick_values(low, high)
+    slack = 1e-9 * (high - low)
+    return [float(tick) for tick in ticks if low - slack <= tick <= high + slack]
+
+
+def format_ticks(ticks: Sequence[float]) -> list[str]:
+    """Return the numbers with the fewest digits that tell them apart."""
+    step = min((abs(b - a) for a, b in pairwise(ticks)), default=0.0)
+    decimals = next((count for count in range(6) if math.isclose(round(step, count), step, rel_tol=1e-6)), None)
+    if step > 0 and decimals is not None and max(map(abs, ticks)) < _LONGEST_NUMBER:
+        labels = [f"{tick:.{decimals}f}" for tick in ticks]
+    else:
+        digits = (count for count in range(3, 17) if len({f"{tick:.{count}g}" for tick in ticks}) == len(set(ticks)))
+        digit_count = next(digits, 17)
+        labels = [f"{tick:.{digit_count}g}" for tick in ticks]
+    return [label.replace("-", "\N{MINUS SIGN}") for label in labels]
