@@ -27,6 +27,7 @@ from service.operations.database_errors import DatabaseError
 from service.operations.replies import InProgress, StoredReply
 from service.operations.sign_in import Identity
 from service.web.api_access import require_caller
+from service.web.compression import compress_response
 from service.web.context import WebContext
 from sim.readers.json_text import read_json
 from sim.readers.reader_errors import UnreadableDataError
@@ -100,12 +101,13 @@ def _parse_cursor_part(part: object, kind: type) -> object:
 
 def respond_with_etag(request: Request, body: bytes, media_type: str, **headers: str) -> Response:
     """Return the response with an entity tag, or 304 without a body if the client already has this version."""
-    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    # A weak one, because it is the same for the compressed body.
+    tag = f'W/"{hashlib.sha256(body).hexdigest()[:32]}"'
     all_headers = {"etag": tag, "cache-control": "private, no-cache", **headers}
     known_tags = request.headers.get("if-none-match", "")
-    if tag in (part.strip().removeprefix("W/") for part in known_tags.split(",")):
+    if tag.removeprefix("W/") in (part.strip().removeprefix("W/") for part in known_tags.split(",")):
         return Response(status_code=304, headers=all_headers)
-    return Response(body, media_type=media_type, headers=all_headers)
+    return compress_response(request, Response(body, media_type=media_type, headers=all_headers))
 
 
 class ApiRequest(Request):

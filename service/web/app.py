@@ -10,7 +10,7 @@ import importlib
 import pkgutil
 from functools import cache, partial
 
-from fastapi import APIRouter, Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.exceptions import HTTPException
@@ -26,6 +26,7 @@ from service.version import GRADER_VERSION
 from service.web import api, pages
 from service.web.access import check_same_site
 from service.web.api_description import build_openapi
+from service.web.compression import compress_response
 from service.web.context import WebContext
 from service.web.errors import add_error_pages
 from service.web.metrics import render_metrics
@@ -57,12 +58,13 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     _add_probes(app, service)
 
     @app.get("/static/{name}", include_in_schema=False)
-    def static(name: str) -> Response:
+    def static(name: str, request: Request) -> Response:
         """Return a static file. Its name contains its hash, so caches can store it for ever."""
         if name not in load_static_files():
             raise HTTPException(404, translatable("This file does not exist."))
         media_type, data = load_static_files()[name]
-        return Response(data, media_type=media_type, headers={"cache-control": "public, max-age=31536000, immutable"})
+        headers = {"cache-control": "public, max-age=31536000, immutable"}
+        return compress_response(request, Response(data, media_type=media_type, headers=headers))
 
     app.openapi = partial(build_openapi, app)  # type: ignore[method-assign]
     return app

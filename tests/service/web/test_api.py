@@ -210,6 +210,10 @@ def test_what_is_known_is_not_sent_again(web: Web, grace: Program) -> None:
         assert first.status_code == 200
         again = grace.ask("GET", f"/grades/{job}{part}", {"if-none-match": first.headers["etag"]})
         assert (again.status_code, again.content) == (304, b"")
+        compressed = grace.ask("GET", f"/grades/{job}{part}", {"accept-encoding": "gzip"})
+        assert compressed.headers["content-encoding"] == "gzip"
+        assert compressed.headers["etag"] == first.headers["etag"]
+        assert compressed.content == first.content
 
 
 def test_where_names_are_hidden_nobody_is_named(web: Web, grace: Program) -> None:
