@@ -59,6 +59,15 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
+class Segments:
+    """Separate straight lines of one style, shape (n, 2, 2): n pairs of points."""
+
+    points: Points
+    stroke: Stroke
+    clip: Rectangle | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Area:
     """A closed polygon, shape (n, 2), with a fill, an edge, or both."""
 
@@ -108,7 +117,7 @@ class Words:
     clip: Rectangle | None = None
 
 
-Item = Line | Area | Marks | Picture | Words
+Item = Line | Segments | Area | Marks | Picture | Words
 
 
 @dataclass(slots=True)

@@ -6,7 +6,7 @@ Positions of ticks come from Matplotlib's locators.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -25,17 +25,18 @@ from service.reports.plots.drawing import (
     Picture,
     Points,
     Rectangle,
+    Segments,
     Stroke,
     Vertical,
 )
 from service.reports.plots.style import INK, MIN_FONT_SIZE, RULE
 
 _TICK_LENGTH, _TICK_GAP = 3 / 72, 2 / 72  # inches
+_LINE_HEIGHT, _DIGIT_WIDTH = MIN_FONT_SIZE / 72 + 0.03, 0.6 * MIN_FONT_SIZE / 72  # inches
 _FRAME = Stroke(RULE, 0.8)
 _TICK_STEPS = (1, 2, 2.5, 5, 10)
 _MAX_TICKS = 9
 _LONGEST_NUMBER = 1e7  # larger ones are written with a power of ten
-_ALL_SIDES = ("left", "bottom", "right", "top")
 
 Side = Literal["left", "bottom", "right", "top"]
 
@@ -133,37 +134,31 @@ class Panel:
         """Colour the panel."""
         self.drawing.add_rectangle(self.place, fill=colour)
 
-    def add_frame(self, sides: Sequence[Side] = _ALL_SIDES) -> None:  # type: ignore[assignment]
+    def add_frame(self, sides: Sequence[Side] = ("left", "bottom", "right", "top")) -> None:
         """Draw edges of the panel."""
-        corners = dict(zip(("left", "bottom", "right", "top"), self._get_edges(), strict=True))
-        for side in sides:
-            self.drawing.add_line(corners[side], _FRAME)
-
-    def _get_edges(self) -> tuple[Points, Points, Points, Points]:
         low_left, low_right, top_right, top_left = self.place.corners
-        return (
-            np.array((low_left, top_left)),
-            np.array((low_left, low_right)),
-            np.array((low_right, top_right)),
-            np.array((top_left, top_right)),
-        )
+        edges: Mapping[Side, tuple[Points, Points]] = {
+            "left": (low_left, top_left),
+            "bottom": (low_left, low_right),
+            "right": (low_right, top_right),
+            "top": (top_left, top_right),
+        }
+        self._add_segments([edges[side] for side in sides], _FRAME)
 
     def add_x_axis(
-        self, ticks: Sequence[float] | None = None, *, label: str = "", labelled: bool = True, size: float = 8
+        self, ticks: Sequence[float] | None = None, *, label: str = "", are_ticks_labelled: bool = True
     ) -> None:
         """Draw ticks below the panel, at round numbers if ``ticks`` is None, and the name of the axis."""
         ticks = self.choose_x_ticks() if ticks is None else ticks
-        place = self.place
-        labels = format_ticks(ticks) if labelled else [""] * len(ticks)
-        for tick, text in zip(ticks, labels, strict=True):
-            x = float(self.to_inches([(tick, self.y_limits[0])])[0, 0])
-            self.drawing.add_line([(x, place.bottom), (x, place.bottom - _TICK_LENGTH)], _FRAME)
-            if text:
-                y = place.bottom - _TICK_LENGTH - _TICK_GAP
-                self.drawing.add_text(x, y, text, size=size, horizontal="center", vertical="top")
+        bottom = self.place.bottom
+        xs = self._to_x_inches(ticks)
+        self._add_segments([((x, bottom), (x, bottom - _TICK_LENGTH)) for x in xs], _FRAME)
+        y = bottom - _TICK_LENGTH - _TICK_GAP
+        for x, text in zip(xs, format_ticks(ticks) if are_ticks_labelled else (), strict=False):
+            self.drawing.add_text(x, y, text, size=MIN_FONT_SIZE, horizontal="center", vertical="top")
         if label:
-            y = place.bottom - _TICK_LENGTH - _TICK_GAP - max(size, MIN_FONT_SIZE) / 72 - 0.03
-            self.drawing.add_text(place.left + place.width / 2, y, label, horizontal="center", vertical="top")
+            middle = self.place.left + self.place.width / 2
+            self.drawing.add_text(middle, y - _LINE_HEIGHT, label, horizontal="center", vertical="top")
 
     def add_y_axis(
         self,
@@ -172,22 +167,20 @@ class Panel:
         *,
         label: str = "",
         tick_length: float = _TICK_LENGTH,
-        size: float = 8,
     ) -> None:
         """Draw ticks at the left of the panel, at round numbers if ``ticks`` is None, and the name of the axis."""
         ticks = self.choose_y_ticks() if ticks is None else ticks
-        place = self.place
         labels = format_ticks(ticks) if labels is None else labels
-        for tick, text in zip(ticks, labels, strict=True):
-            y = float(self.to_inches([(self.x_limits[0], tick)])[0, 1])
-            if tick_length:
-                self.drawing.add_line([(place.left, y), (place.left - tick_length, y)], _FRAME)
-            x = place.left - tick_length - _TICK_GAP
-            self.drawing.add_text(x, y, text, size=size, horizontal="right", vertical="middle")
+        left = self.place.left
+        ys = self._to_y_inches(ticks)
+        self._add_segments([((left, y), (left - tick_length, y)) for y in ys], _FRAME)
+        x = left - tick_length - _TICK_GAP
+        for y, text in zip(ys, labels, strict=True):
+            self.drawing.add_text(x, y, text, size=MIN_FONT_SIZE, horizontal="right", vertical="middle")
         if label:
-            widest = max((len(text) for text in labels), default=0) * 0.6 * max(size, MIN_FONT_SIZE) / 72
-            x = max(place.left - tick_length - _TICK_GAP - widest - 0.03, 0.14)
-            self.drawing.add_text(x, place.bottom + place.height / 2, label, horizontal="center", rotation=90)
+            widest = max((len(text) for text in labels), default=0) * _DIGIT_WIDTH
+            middle = self.place.bottom + self.place.height / 2
+            self.drawing.add_text(max(x - widest - 0.03, 0.14), middle, label, horizontal="center", rotation=90)
 
     def choose_x_ticks(self) -> list[float]:
         """Return round numbers along the x axis, as many as fit."""
@@ -199,11 +192,23 @@ class Panel:
 
     def add_grid(self, x_ticks: Sequence[float], y_ticks: Sequence[float], opacity: float = 0.7) -> None:
         """Draw thin lines through the ticks of both axes."""
-        stroke = Stroke(RULE, 0.5, opacity=opacity)
-        for x in x_ticks:
-            self.add_line([(x, self.y_limits[0]), (x, self.y_limits[1])], stroke)
-        for y in y_ticks:
-            self.add_line([(self.x_limits[0], y), (self.x_limits[1], y)], stroke)
+        place = self.place
+        right, top = place.left + place.width, place.bottom + place.height
+        lines = [
+            *(((x, place.bottom), (x, top)) for x in self._to_x_inches(x_ticks)),
+            *(((place.left, y), (right, y)) for y in self._to_y_inches(y_ticks)),
+        ]
+        self._add_segments(lines, Stroke(RULE, 0.5, opacity=opacity))
+
+    def _to_x_inches(self, xs: Sequence[float]) -> list[float]:
+        return [float(x) for x in self.to_inches([(x, self.y_limits[0]) for x in xs])[:, 0]]
+
+    def _to_y_inches(self, ys: Sequence[float]) -> list[float]:
+        return [float(y) for y in self.to_inches([(self.x_limits[0], y) for y in ys])[:, 1]]
+
+    def _add_segments(self, segments: Sequence[tuple[Sequence[float] | Points, ...]], stroke: Stroke) -> None:
+        if segments:
+            self.drawing.items.append(Segments(np.array(segments, dtype=np.float64), stroke))
 
 
 def choose_ticks(limits: tuple[float, float], max_intervals: int) -> list[float]:

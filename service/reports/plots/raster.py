@@ -21,7 +21,7 @@ from matplotlib.transforms import Affine2D, Bbox
 from numpy.typing import NDArray
 from PIL import Image
 
-from service.reports.plots.drawing import Area, Drawing, Item, Line, Marks, Picture, Rectangle, Stroke, Words
+from service.reports.plots.drawing import Area, Drawing, Item, Line, Marks, Picture, Rectangle, Segments, Stroke, Words
 from service.reports.plots.plot import DPI
 from service.reports.plots.style import BOLD_FONT_FILE, FONT_FILE, INK, MAX_PIXELS, replace_missing_glyphs
 
@@ -80,6 +80,10 @@ class _Raster:
             case Line():
                 context = self._create_context(item.stroke, item.clip)
                 self._renderer.draw_path(context, Path(item.points), self._to_pixels)
+            case Segments():
+                context = self._create_context(item.stroke, item.clip)
+                codes = np.tile((Path.MOVETO, Path.LINETO), len(item.points))
+                self._renderer.draw_path(context, Path(item.points.reshape(-1, 2), codes), self._to_pixels)
             case Area():
                 self._draw_area(item)
             case Marks():

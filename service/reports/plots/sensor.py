@@ -133,7 +133,7 @@ def _draw_panel(
     for curve, stroke in zip(readings.curves, _CURVE_STROKES, strict=False):
         panel.add_line(np.column_stack((times, _clip_readings(curve.values))), stroke)
     panel.add_frame(("left", "bottom"))
-    panel.add_x_axis(x_ticks, labelled=is_last, label="simulated time, s" if is_last else "")
+    panel.add_x_axis(x_ticks, are_ticks_labelled=is_last, label="simulated time, s" if is_last else "")
     panel.add_y_axis(y_ticks)
     title_y = place.bottom + place.height + 0.045
     drawing.add_text(_LEFT_EDGE, title_y, readings.panel.title, size=8, bold=True)
