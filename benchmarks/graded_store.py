@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 
 from responders.source_file import SourceFile
 from service.grading.grader import grade
-from service.store.batches import intake
+from service.store.batches import intake, stored_requests
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.queue import jobs
@@ -50,7 +50,7 @@ def create_graded_batch(store: Store) -> GradedBatch:
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     with store.reading() as session:
-        request = intake.load_grading_request(session, claim.job_id)
+        request = stored_requests.load_grading_request(session, claim.job_id)
     student_grade = grade(request.submission, request.assignment)
     jobs.finish_job(store, claim, results.prepare_grade(student_grade), datetime.now(UTC))
     return GradedBatch(batch.id, claim.job_id)

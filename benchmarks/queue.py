@@ -21,7 +21,7 @@ from service.queue.notifier import Notifier
 from service.queue.supervisor import Supervisor
 from service.report_files import write_report
 from service.settings import load_settings
-from service.store.batches import batches, intake
+from service.store.batches import batches, intake, job_lines
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
 from service.store.models import Job
@@ -61,7 +61,7 @@ class _Bench:
         self.notifier.grade(JobQueue.INTERACTIVE)
         self.wait_until(lambda: self._graded(job))
         with self.store.reading() as session:
-            line, student_grade = batches.load_job_line(session, job), results.load_grade(session, job)
+            line, student_grade = job_lines.load_job_line(session, job), results.load_grade(session, job)
         write_report(self.store, line, student_grade, self.folder, student)
         return time.perf_counter() - start
 

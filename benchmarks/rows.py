@@ -18,7 +18,7 @@ from benchmarks.graded_store import create_graded_batch
 from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
 from benchmarks.measurement import MILLISECONDS, Measurement, measure_wall_seconds, median
 from service.settings import load_settings
-from service.store.batches import batches
+from service.store.batches import batches, job_lines
 from service.store.engine import Store, open_store
 from service.store.models import Job
 from service.store.queue import jobs
@@ -54,13 +54,13 @@ def _query_batches(store: Store) -> object:
 
 def _query_marks(store: Store) -> object:
     with store.reading() as session:
-        return batches.load_job_lines(session, many_rows.format_batch_name(3))
+        return job_lines.load_job_lines(session, many_rows.format_batch_name(3))
 
 
 def _query_student(store: Store) -> object:
     with store.reading() as session:
         enrolment = many_rows.compute_enrolment_id(many_rows.STUDENTS // 2)
-        return session.execute(batches._select_job_lines().where(Job.enrolment_id == enrolment)).all()
+        return session.execute(job_lines._select_job_lines().where(Job.enrolment_id == enrolment)).all()
 
 
 def _query_grade(store: Store) -> object:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from service.grading.grade import Grade
 from service.reports.rows import TableRow, describe_missing_part
-from service.store.batches.batches import JobLine
+from service.store.batches.job_lines import JobLine
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.states import JobState

@@ -38,8 +38,8 @@ from service.reports.view import (
     list_scenarios,
     select_overlay_trials,
 )
-from service.store.batches import intake, rankings
-from service.store.batches.batches import JobLine
+from service.store.batches import rankings, stored_requests
+from service.store.batches.job_lines import JobLine
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import plots, results
@@ -92,8 +92,8 @@ def write_grade_replay(
     Raises UsageError if the file cannot be written, or the reader may not see those trials.
     """
     with store.reading() as session:
-        submission = intake.load_submission(session, line.id)
-        floors = load_own_floors(intake.load_assignment(session, line.id))
+        submission = stored_requests.load_submission(session, line.id)
+        floors = load_own_floors(stored_requests.load_assignment(session, line.id))
         view = _build_view(session, line, grade, language)
         overlay_trials = _load_other_trials(session, line, view, overlay_line)
     write_replay(path, build_grade_replay(view, submission, floors, overlay_trials=overlay_trials), language)
@@ -105,7 +105,7 @@ def write_grade_film(store: Store, line: JobLine, grade: Grade, path: Path, numb
     Raises UsageError if there is none, or the file cannot be written.
     """
     with store.reading() as session:
-        floors = load_own_floors(intake.load_assignment(session, line.id))
+        floors = load_own_floors(stored_requests.load_assignment(session, line.id))
         visible_grade = _build_view(session, line, grade).grade
     if not visible_grade.trials:
         raise UsageError(f"{line.id} has no visible trial, so there is no film")
@@ -193,12 +193,15 @@ def render_each_report(
 
     All data is read with a fixed number of statements. ``views`` must match ``job_ids``, ordered by id.
     """
-    submissions, all_plots = intake.load_each_submission(session, job_ids), plots.load_each_plots(session, job_ids)
+    submissions, all_plots = (
+        stored_requests.load_each_submission(session, job_ids),
+        plots.load_each_plots(session, job_ids),
+    )
     floors: dict[tuple[str, str], Mapping[str, Pixels]] = {}
     for (job_id, view), (_, submission), (_, report_plots) in zip(views, submissions, all_plots, strict=True):
         version = (view.grade.assignment, view.grade.assignment_version)
         if not _has_built_in_floors(view) and version not in floors:
-            floors[version] = load_own_floors(intake.load_assignment(session, job_id))
+            floors[version] = load_own_floors(stored_requests.load_assignment(session, job_id))
         page = partial(render_report_page, view, report_plots, submission, floors.get(version, {}))
         yield job_id, view, render_or_explain(view, page)
 
@@ -212,9 +215,9 @@ def _load_report_data(
 ) -> tuple[Mapping[str, bytes], Submission, Mapping[str, Pixels]]:
     """Load the plots, the submission and the floors of a report."""
     with store.reading() as session:
-        submission = intake.load_submission(session, job_id)
+        submission = stored_requests.load_submission(session, job_id)
         drawn_plots = plots.load_plots(session, job_id) if plot_state is PlotState.DONE else {}
-        floors = {} if _has_built_in_floors(view) else load_own_floors(intake.load_assignment(session, job_id))
+        floors = {} if _has_built_in_floors(view) else load_own_floors(stored_requests.load_assignment(session, job_id))
     return drawn_plots, submission, floors
 
 
@@ -223,13 +226,15 @@ def _render_page(
 ) -> tuple[str, Mapping[str, bytes]]:
     """Return the page of a graded job, and its plots."""
     with store.reading() as session:
-        submission = intake.load_submission(session, line.id)
+        submission = stored_requests.load_submission(session, line.id)
         view = _build_view(session, line, grade, language)
         overlay_trials = _load_other_trials(session, line, view, overlay_line)
         drawn_plots = plots.load_plots(session, line.id) if line.plots is PlotState.DONE else None
         has_built_in_floors = {trial.recording.background for trial in grade.trials} <= set(list_floor_names())
         assignment = (
-            None if drawn_plots is not None and has_built_in_floors else intake.load_assignment(session, line.id)
+            None
+            if drawn_plots is not None and has_built_in_floors
+            else stored_requests.load_assignment(session, line.id)
         )
     shown = dict(drawn_plots or {})
 

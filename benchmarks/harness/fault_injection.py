@@ -36,7 +36,8 @@ from service.queue.live_workers import WORKER_VARIABLE, create_worker_name
 from service.queue.notifier import Notifier
 from service.queue.processes import end_processes, start_process
 from service.settings import Settings
-from service.store.batches.intake import accept_batch, load_grading_request
+from service.store.batches.intake import accept_batch
+from service.store.batches.stored_requests import load_grading_request
 from service.store.engine import Store
 from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
 from service.store.states import UNFINISHED, JobQueue, JobState

@@ -23,7 +23,7 @@ from service.operations.lookup import (
 )
 from service.store import audit
 from service.store.audit import AuditEntry as AuditEntry
-from service.store.batches import batch_table, batches, publishing, rankings, regrades
+from service.store.batches import batch_table, batches, job_lines, publishing, rankings, regrades
 from service.store.batches.batch_table import REFUSED as REFUSED
 from service.store.batches.batch_table import SORTS as SORTS
 from service.store.batches.batch_table import STATES as STATES
@@ -33,9 +33,9 @@ from service.store.batches.batch_table import TablePage as TablePage
 from service.store.batches.batch_table import TableRequest as TableRequest
 from service.store.batches.batches import BatchLine as BatchLine
 from service.store.batches.batches import BatchProgress as BatchProgress
-from service.store.batches.batches import JobLine as JobLine
 from service.store.batches.class_overview import ClassOverview as ClassOverview
 from service.store.batches.class_overview import compute_overviews, load_missing_students
+from service.store.batches.job_lines import JobLine as JobLine
 from service.store.batches.regrades import Change, ChangesPage
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
@@ -224,16 +224,16 @@ def list_grades(
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return batches.load_job_lines_page(session, batch_id, hidden_names, limit, last_id)
+        return job_lines.load_job_lines_page(session, batch_id, hidden_names, limit, last_id)
 
 
 def list_submitted(service: Service, actor: Actor, submitted_batch: SubmittedBatch) -> list[JobLine]:
     """Return the grades of new submissions and of those known before, for operators. Raises NotFound."""
     check_operator(actor)
     with service.store.reading() as session:
-        lines = [batches.load_job_line(session, known.job_id) for known in submitted_batch.known]
+        lines = [job_lines.load_job_line(session, known.job_id) for known in submitted_batch.known]
         if submitted_batch.batch is not None:
-            lines += batches.load_attempt_lines(session, submitted_batch.batch.id)
+            lines += job_lines.load_attempt_lines(session, submitted_batch.batch.id)
     return sorted(lines, key=lambda line: (line.student, line.id))
 
 
@@ -310,7 +310,7 @@ def _load_graded_view(
     session: Session, actor: Actor, course_id: int, batch_id: str, hidden_names: HiddenNames
 ) -> GradedView:
     view = _load_view(session, actor, course_id, batch_id)
-    lines = tuple(batches.load_job_lines(session, batch_id, hidden_names))
+    lines = tuple(job_lines.load_job_lines(session, batch_id, hidden_names))
     return GradedView(view, lines, _compute_statistics(session, lines), _count_waiting_regrades(session, view.batch))
 
 

@@ -23,7 +23,7 @@ from service.store import audit
 from service.store.batches import batches, intake, preflight
 from service.store.batches.intake import AcceptedBatch, BatchIntake
 from service.store.batches.intake import AcceptedSubmission as AcceptedSubmission
-from service.store.batches.intake import KnownSubmission as KnownSubmission
+from service.store.batches.known_submissions import KnownSubmission as KnownSubmission
 from service.store.batches.preflight import IntakePreview
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames

@@ -18,8 +18,8 @@ from service.report_files import render_report_pages
 from service.reports.formats import FORMATS, Format
 from service.reports.output_files import build_file_stems, build_refused_stems
 from service.reports.rows import TableRow
-from service.store.batches import batches, publishing
-from service.store.batches.batches import JobLine as JobLine
+from service.store.batches import batches, job_lines, publishing
+from service.store.batches.job_lines import JobLine as JobLine
 from service.store.grades import current_grades
 from service.store.states import Role
 from submissions.raw_files import sanitise_name
@@ -93,7 +93,7 @@ def export(
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        lines = batches.load_job_lines(session, batch_id, hidden_names)
+        lines = job_lines.load_job_lines(session, batch_id, hidden_names)
         refusals = batches.load_batch(session, batch_id).refusals
         unpublished_count = publishing.count_unpublished_regrades(session, batch_id)
     hidden_assignments = sorted({line.assignment for line in lines} & hidden_names.assignments)

@@ -18,8 +18,8 @@ from service.reports.replay.document import build_grade_replay
 from service.reports.view import View, build_staff_view
 from service.store import audit
 from service.store.audit import AuditEntry
-from service.store.batches import batch_table, batches, intake, regrades
-from service.store.batches.batches import JobLine
+from service.store.batches import batch_table, job_lines, regrades, stored_requests
+from service.store.batches.job_lines import JobLine
 from service.store.batches.regrades import Change, GradingLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
@@ -64,7 +64,7 @@ def show_state(service: Service, actor: Actor, course_id: int, job_id: str) -> J
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         _require_course_job(session, actor, course_id, job_id)
-        return batches.load_job_line(session, job_id).hide_name(hidden_names)
+        return job_lines.load_job_line(session, job_id).hide_name(hidden_names)
 
 
 def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH) -> GradeView:
@@ -72,7 +72,7 @@ def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, lang
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         row = _require_course_job(session, actor, course_id, job_id)
-        named_line = batches.load_job_line(session, job_id)
+        named_line = job_lines.load_job_line(session, job_id)
         line = named_line.hide_name(hidden_names)
         change = regrades.load_change(session, job_id)
         gradings = regrades.load_gradings(session, row.submission_id)
@@ -123,8 +123,8 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
 
 def build_replay_document(session: Session, job_id: str, view: View) -> dict[str, Any]:
     """Return the replay data of the trials in a view of a job's grade."""
-    submission = intake.load_submission(session, job_id)
-    return build_grade_replay(view, submission, load_own_floors(intake.load_assignment(session, job_id)))
+    submission = stored_requests.load_submission(session, job_id)
+    return build_grade_replay(view, submission, load_own_floors(stored_requests.load_assignment(session, job_id)))
 
 
 def _require_course_job(session: Session, actor: Actor, course_id: int, job_id: str) -> Job:
@@ -148,7 +148,7 @@ def _load_result(
     hidden_names: HiddenNames = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         _require_course_job(session, actor, course_id, job_id)
-        line = batches.load_job_line(session, job_id).hide_name(hidden_names)
+        line = job_lines.load_job_line(session, job_id).hide_name(hidden_names)
         if line.state is not JobState.DONE:
             raise NotFound("There is no such page or item, or you have no access to it.")
         return line, _load_staff_view(session, line, language)

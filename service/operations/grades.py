@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
 from service.operations.lookup import load_names_for_actor, require_course, require_job
-from service.store.batches import batches
-from service.store.batches.batches import JobLine
+from service.store.batches import job_lines
+from service.store.batches.job_lines import JobLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import retry_conflicts
 from service.store.grades import comments, marking_history, overrides
@@ -158,7 +158,7 @@ def _apply_change(
 def _load_marking(session: Session, job_id: str, hidden_names: HiddenNames) -> Marking:
     row = session.get_one(Job, job_id)
     return Marking(
-        batches.load_job_line(session, job_id).hide_name(hidden_names),
+        job_lines.load_job_line(session, job_id).hide_name(hidden_names),
         session.get_one(AssignmentVersion, row.assignment_version_id).title,
         overrides.load_criterion_marks(session, job_id),
         comments.load_comments(session, job_id),

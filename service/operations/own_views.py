@@ -17,7 +17,7 @@ from service.operations.own_submissions import Allowance, OwnAssignment, OwnSubm
 from service.report_files import render_report_body, render_standalone_report
 from service.reports.html import ReportParts
 from service.reports.view import View, build_student_view
-from service.store.batches import intake
+from service.store.batches import stored_requests
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.grades import appeals, results
@@ -209,7 +209,7 @@ def load_visible_assignment(session: Session, course_id: int, enrolment_id: int,
     newest_attempt = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
     if not newest_attempt:
         raise _build_not_found()
-    return intake.load_assignment(session, newest_attempt[0].job_id)
+    return stored_requests.load_assignment(session, newest_attempt[0].job_id)
 
 
 def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int:

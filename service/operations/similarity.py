@@ -10,8 +10,9 @@ from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
 from service.operations.lookup import load_names_for_actor, require_batch, require_course
 from service.similarity.pairs import Similarity
-from service.store.batches import batches
-from service.store.batches.batches import BatchLine, JobLine
+from service.store.batches import batches, job_lines
+from service.store.batches.batches import BatchLine
+from service.store.batches.job_lines import JobLine
 from service.store.batches.similarities import MAX_COMPARED_SUBMISSIONS, SourceTexts, find_similar_submissions
 from service.store.states import Role
 
@@ -36,8 +37,8 @@ def show_similar(service: Service, actor: Actor, course_id: int, batch_id: str) 
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
         line = batches.load_batch(session, batch_id)
-        assignments = sorted({each.assignment for each in batches.load_job_lines(session, batch_id)})
-        lines = tuple(batches.load_course_lines(session, course_id, assignments, hidden_names))
+        assignments = sorted({each.assignment for each in job_lines.load_job_lines(session, batch_id)})
+        lines = tuple(job_lines.load_course_lines(session, course_id, assignments, hidden_names))
     similarities = (
         tuple(find_similar_submissions(service.store, lines)) if len(lines) <= MAX_COMPARED_SUBMISSIONS else None
     )
@@ -75,6 +76,6 @@ def show_similar_in_batch(
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
         line = batches.load_batch(session, batch_id)
-        lines = tuple(batches.load_job_lines(session, batch_id, hidden_names))
+        lines = tuple(job_lines.load_job_lines(session, batch_id, hidden_names))
     similarities = tuple(find_similar_submissions(service.store, lines, given_code))
     return ComparedBatch(line, lines, similarities, SourceTexts(service.store, lines).load_text)

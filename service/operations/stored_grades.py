@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import check_operator
-from service.store.batches import batches
-from service.store.batches.batches import JobLine as JobLine
+from service.store.batches import batches, job_lines
+from service.store.batches.job_lines import JobLine as JobLine
 
 if TYPE_CHECKING:
     from service.grading.grade import Grade
@@ -36,24 +36,24 @@ def find(service: Service, actor: Actor, grade: str) -> JobLine:
     """
     check_operator(actor)
     with service.store.reading() as session:
-        return batches.load_job_line(session, batches.find_job(session, grade))
+        return job_lines.load_job_line(session, batches.find_job(session, grade))
 
 
 def find_previous(service: Service, actor: Actor, job_id: str) -> JobLine:
     """Return the standing grade of the same student's previous attempt. Raises NotFound, UsageError."""
     check_operator(actor)
     with service.store.reading() as session:
-        return batches.load_job_line(session, batches.find_previous_job(session, job_id))
+        return job_lines.load_job_line(session, batches.find_previous_job(session, job_id))
 
 
 def load_summary(service: Service, actor: Actor, job_id: str) -> tuple[Grade, Submission]:
     """Load a grade as it counts, with its submission and recordings without ticks and images. Raises NotFound."""
-    from service.store.batches import intake
+    from service.store.batches import stored_requests
     from service.store.grades import results
 
     check_operator(actor)
     with service.store.reading() as session:
-        return results.load_grade_texts(session, job_id), intake.load_submission(session, job_id)
+        return results.load_grade_texts(session, job_id), stored_requests.load_submission(session, job_id)
 
 
 def load(service: Service, actor: Actor, job_id: str) -> Grade:
@@ -67,7 +67,7 @@ def load(service: Service, actor: Actor, job_id: str) -> Grade:
 
 def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
     """Load the grading whose id begins with ``grade``. Raises NotFound, and UsageError without a grade."""
-    from service.store.batches import intake
+    from service.store.batches import stored_requests
     from service.store.grades import results
     from service.store.installation import load_secret
     from service.store.models import Job
@@ -78,6 +78,6 @@ def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
         job = session.get_one(Job, batches.find_job(session, grade))
         stored_grade, request = (
             results.load_original_grade(session, job.id),
-            intake.load_grading_request(session, job.id),
+            stored_requests.load_grading_request(session, job.id),
         )
         return StoredGrading(job.id, stored_grade, request, job.grader_sha256, job.secret_sha256, own_secret)

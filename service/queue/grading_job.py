@@ -20,7 +20,7 @@ from service.grading.trial_runner import TrialRunner
 from service.plotting import draw_plots
 from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
-from service.store.batches import intake
+from service.store.batches import stored_requests
 from service.store.engine import Store
 from service.store.grades import plots, results
 from service.store.installation import load_secret
@@ -79,7 +79,7 @@ def plot_next_job(store: Store, settings: Settings) -> str | None:
         return None
     with store.reading() as session:
         original_grade = results.load_original_grade(session, job_id)
-        request = intake.load_grading_request(session, job_id)
+        request = stored_requests.load_grading_request(session, job_id)
     drawn_plots = draw_plots(original_grade, request.assignment, request.submission)
     _retry_while_unreachable(lambda: plots.store_plots(store, job_id, drawn_plots), settings.lease_seconds)
     return job_id
@@ -91,7 +91,7 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
         return
     progress = _Progress(claim)
     with store.reading() as session:
-        grading_request = intake.load_grading_request(session, claim.job_id)
+        grading_request = stored_requests.load_grading_request(session, claim.job_id)
     short_wait_store = store.with_short_wait()
     with LeaseKeeper(
         lambda: jobs.renew_lease(short_wait_store, claim, settings.lease_seconds, progress.share),

@@ -23,9 +23,9 @@ from service.report_files import (
     write_report,
 )
 from service.reports.view import View, build_student_view
-from service.store.batches import batches
-from service.store.batches.batches import JobLine
+from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch
+from service.store.batches.job_lines import JobLine
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
@@ -46,7 +46,7 @@ def stored(store: Store, student: str, program: int, grade: Grade) -> tuple[JobL
 
 def line_of(store: Store, job_id: str) -> JobLine:
     with store.reading() as session:
-        return batches.load_job_line(session, job_id)
+        return job_lines.load_job_line(session, job_id)
 
 
 def replay_over(store: Store, line: JobLine, over: JobLine, folder: Path) -> dict[str, object]:
@@ -123,7 +123,7 @@ def test_what_is_for_staff_is_shown_over_nothing_that_a_student_reads(store: Sto
     assert claim is not None
     jobs.finish_job(store, claim, results.prepare_grade(parting_grade()), datetime.now(UTC))
     with store.reading() as session:
-        (proposed,) = batches.load_job_lines(session, proposal.batch_id)
+        (proposed,) = job_lines.load_job_lines(session, proposal.batch_id)
     with pytest.raises(UsageError, match="not published"):
         replay_over(store, first, proposed, tmp_path)
     over_the_limit = replace(first, staff_only="attempt 2, allowed: 1")

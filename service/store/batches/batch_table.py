@@ -15,18 +15,10 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from service.store.batches.batches import match_standing_jobs
+from service.store.batches.job_lines import match_standing_jobs
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import current_grades, overrides
-from service.store.models import (
-    AssignmentVersion,
-    Batch,
-    CriterionResultRow,
-    Enrolment,
-    Job,
-    SubmissionRow,
-    TrialRow,
-)
+from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.states import CancelReason, JobState
 from submissions.student_identity import RejectedSubmission
 

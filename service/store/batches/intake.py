@@ -7,48 +7,35 @@ from __future__ import annotations
 
 import secrets
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import TYPE_CHECKING, TypeVar
 
-from sqlalchemy import ColumnElement, delete, func, or_, select
+from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from service.store import outbox
+from service.store.batches.known_submissions import KnownSubmission, find_known_submission
 from service.store.codec import encode
 from service.store.courses import open_assignments
-from service.store.courses.assignment_versions import (
-    FrozenAssignment,
-    assignment_from_bytes,
-    freeze_assignment,
-    store_version,
-)
+from service.store.courses.assignment_versions import FrozenAssignment, freeze_assignment, store_version
 from service.store.courses.policies import Ruling, apply_policy
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import result_cache
 from service.store.ids import generate_id
 from service.store.installation import load_secret
 from service.store.locks import lock_jobs
-from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
+from service.store.models import Batch, Job, SubmissionRow
 from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.queue import jobs
-from service.store.states import BatchState, CancelReason, JobQueue, JobState, Standing
+from service.store.states import CancelReason, JobQueue, JobState
 from service.store.web_tables import Comment
 from service.version import hash_grader
-from sim.errors import HostError, UsageError
+from sim.errors import UsageError
 from submissions.grading_request import GradingRequest
 from submissions.raw_files import MEGABYTE
-from submissions.stored_submission import pack_submission, unpack_submission
+from submissions.stored_submission import pack_submission
 from submissions.student_identity import RejectedSubmission
-from submissions.submission import Submission
-
-if TYPE_CHECKING:
-    from submissions.assignment.definition import Assignment
-
-Read = TypeVar("Read")
-#: Number of submissions fetched at once.
-_CHUNK_SIZE = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,18 +58,6 @@ class AcceptedBatch:
     id: str
     jobs: tuple[AcceptedSubmission, ...]
     refused: tuple[RejectedSubmission, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class KnownSubmission:
-    """A submission that is identical to the student's newest one for the same assignment, so it changes nothing."""
-
-    job_id: str
-    batch_id: str | None
-    student: str
-    assignment: str
-    state: JobState
-    other_grader: bool = False  # graded by a different version of the grader
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,51 +196,6 @@ def accept_new_submissions(
         return batch_intake
 
 
-def load_grading_request(session: Session, job_id: str) -> GradingRequest:
-    """Rebuild the grading request of a job from the database.
-
-    Raises UsageError for an unknown job, HostError if the stored data cannot be read.
-    """
-    source = select(SubmissionRow.source).join(Job, Job.submission_id == SubmissionRow.id)
-    return GradingRequest(
-        load_submission(session, job_id),
-        load_assignment(session, job_id),
-        session.scalars(source.where(Job.id == job_id)).one(),
-    )
-
-
-def load_submission(session: Session, job_id: str) -> Submission:
-    """Return the submission of a job; raises like ``load_grading_request``."""
-    query = select(SubmissionRow.packed).join(Job, Job.submission_id == SubmissionRow.id)
-    return _unpack_stored(unpack_submission, session.scalar(query.where(Job.id == job_id)), "submission", job_id)
-
-
-def load_each_submission(session: Session, job_ids: Collection[str]) -> Iterator[tuple[str, Submission]]:
-    """Yield each job id with its submission, read in one statement and ordered by id.
-
-    Only one submission is in memory at a time. Raises HostError if the stored data cannot be read.
-    """
-    query = select(Job.id, SubmissionRow.packed).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    query = query.where(Job.id.in_(job_ids)).order_by(Job.id)
-    for job_id, packed_submission in session.execute(query, execution_options={"yield_per": _CHUNK_SIZE}):
-        yield job_id, _unpack_stored(unpack_submission, packed_submission, "submission", job_id)
-
-
-def load_assignment(session: Session, job_id: str) -> Assignment:
-    """Return the assignment version of a job; raises like ``load_grading_request``."""
-    query = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
-    return _unpack_stored(assignment_from_bytes, session.scalar(query.where(Job.id == job_id)), "assignment", job_id)
-
-
-def _unpack_stored(decode_content: Callable[[bytes], Read], content: bytes | None, subject: str, job_id: str) -> Read:
-    if content is None:
-        raise UsageError(f"there is no job {job_id}")
-    try:
-        return decode_content(content)
-    except (UsageError, ValueError, TypeError, KeyError) as error:
-        raise HostError(f"The {subject} of {job_id} cannot be read back: {error}") from error
-
-
 @dataclass(frozen=True, slots=True)
 class _PackedRequest:
     grading_request: GradingRequest
@@ -326,44 +256,6 @@ def _enrol_students(
                 )
             )
     return items, tuple(refusals)
-
-
-def find_known_submission(
-    session: Session, grading_request: GradingRequest, enrolment_id: int, assignment_sha256: str
-) -> KnownSubmission | None:
-    """Return the job of the student's newest submission if it is identical; None for a new submission."""
-    newest_row = session.scalar(
-        select(SubmissionRow)
-        .where(
-            SubmissionRow.enrolment_id == enrolment_id,
-            SubmissionRow.assignment == grading_request.assignment.id,
-        )
-        .order_by(SubmissionRow.attempt.desc())
-        .limit(1)
-    )
-    if newest_row is None or newest_row.sha256 != grading_request.submission.sha256:
-        return None
-    query = (
-        select(Job)
-        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .outerjoin(Batch, Job.batch_id == Batch.id)
-        .where(
-            Job.submission_id == newest_row.id,
-            AssignmentVersion.sha256 == assignment_sha256,
-            Job.state != JobState.CANCELLED,
-            # A dead job of a cancelled batch cannot be retried, so its submission is accepted again.
-            or_(Job.state != JobState.DEAD, Job.batch_id.is_(None), Batch.state != BatchState.CANCELLED),
-        )
-        # An unpublished regrade sorts after the standing grade.
-        .order_by(Job.standing == Standing.KEPT, Job.standing == Standing.PROPOSED, Job.queued_at.desc(), Job.id)
-        .limit(1)
-    )
-    job = session.scalar(query)
-    if job is None:
-        return None
-    other_grader = job.state is JobState.DONE and job.grader_sha256 not in (None, hash_grader())
-    student, assignment = grading_request.submission.student, newest_row.assignment
-    return KnownSubmission(job.id, job.batch_id, student, assignment, job.state, other_grader)
 
 
 def _accept_batch(

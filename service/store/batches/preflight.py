@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from sqlalchemy.orm import Session
 
-from service.store.batches import intake
+from service.store.batches import known_submissions
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import result_cache
 from service.store.people.students import Students
@@ -67,7 +67,7 @@ def _preview_request(
     if (
         may_be_known
         and enrolment_id is not None
-        and intake.find_known_submission(session, grading_request, enrolment_id, assignment_sha256)
+        and known_submissions.find_known_submission(session, grading_request, enrolment_id, assignment_sha256)
     ):
         return IntakePreview(enrolled=True, known=True, copied=False)
     key = result_cache.combine_cache_key(

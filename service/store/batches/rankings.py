@@ -13,7 +13,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.grading.ranks import RankTable, StudentMeasures, rank_students
-from service.store.batches.batches import JobLine
+from service.store.batches.job_lines import JobLine
 from service.store.codec import decode
 from service.store.courses.assignment_versions import assignment_from_bytes
 from service.store.grades import current_grades, overrides

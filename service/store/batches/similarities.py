@@ -12,8 +12,8 @@ from service.similarity.behaviour import extract_behaviour
 from service.similarity.pairs import Similarity, compare_submissions
 from service.similarity.similar_sources import build_source
 from service.similarity.sources import collect_given_code, extract_sources
-from service.store.batches import intake
-from service.store.batches.batches import JobLine
+from service.store.batches import stored_requests
+from service.store.batches.job_lines import JobLine
 from service.store.engine import Store
 from service.store.grades import current_grades, results
 
@@ -48,7 +48,7 @@ class SourceTexts:
         """Return the text of one file of a student."""
         if not self._texts:
             with self._store.reading() as session:
-                submissions = intake.load_each_submission(session, self._jobs.values())
+                submissions = stored_requests.load_each_submission(session, self._jobs.values())
                 self._texts = {job_id: extract_sources(submission) for job_id, submission in submissions}
         return self._texts[self._jobs[assignment, student]][file]
 
@@ -56,9 +56,9 @@ class SourceTexts:
 def _compare_assignment(store: Store, lines: Sequence[JobLine], given_code: Path | None) -> Similarity:
     graded_ids = [line.id for line in lines if current_grades.is_trusted(line)]
     with store.reading() as session:
-        assignment = intake.load_assignment(session, lines[0].id)
+        assignment = stored_requests.load_assignment(session, lines[0].id)
         ignored_code = collect_given_code(assignment, given_code)
-        submissions = intake.load_each_submission(session, [line.id for line in lines])
+        submissions = stored_requests.load_each_submission(session, [line.id for line in lines])
         texts = {job_id: extract_sources(submission) for job_id, submission in submissions}
         trials = results.load_each_trials(session, graded_ids)
         behaviours_by_job = {job_id: extract_behaviour(of_job) for job_id, of_job in trials}

@@ -18,7 +18,7 @@ from responders.source_file import SourceFile
 from service.commands.batch.similar import similar
 from service.report_files import write_batch_reports
 from service.reports.formats import FORMATS
-from service.store.batches import batches
+from service.store.batches import job_lines
 from service.store.batches.intake import accept_batch
 from service.store.batches.similarities import find_similar_submissions
 from service.store.engine import Store
@@ -61,7 +61,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sto
             claim = jobs.claim_job(store, "worker", 60)
             assert claim is not None
             with store.reading() as session:
-                student = batches.load_job_line(session, claim.job_id).student
+                student = job_lines.load_job_line(session, claim.job_id).student
             seconds = 30 if student in ("ada", "zebedee") else 40 + number
             grade = replace(report_builders.line_follower_grade(seconds), student=student)
             jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
@@ -71,7 +71,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sto
 def test_who_wrote_and_did_the_same_is_one_pair_with_all_its_evidence(graded: tuple[Path, Store, str]) -> None:
     _, store, batch = graded
     with store.reading() as session:
-        lines = batches.load_job_lines(session, batch)
+        lines = job_lines.load_job_lines(session, batch)
     (found,) = find_similar_submissions(store, lines)
     (pair,) = found.pairs
     assert pair.students == ("ada", "zebedee")
@@ -113,7 +113,7 @@ def test_json_is_all_that_is_printed(graded: tuple[Path, Store, str]) -> None:
 def test_no_report_and_no_format_has_anything_of_it(graded: tuple[Path, Store, str], tmp_path: Path) -> None:
     _, store, batch = graded
     with store.reading() as session:
-        lines = batches.load_job_lines(session, batch)
+        lines = job_lines.load_job_lines(session, batch)
         grades = [results.load_grade(session, line.id) for line in lines]
     for line, grade in zip(lines, grades, strict=True):
         if line.student == "ada":

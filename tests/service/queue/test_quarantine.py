@@ -35,7 +35,7 @@ from service.queue.self_test import SelfTester, SelfTestResult
 from service.queue.worker import QUARANTINED_STATUS
 from service.settings import Settings
 from service.store import audit
-from service.store.batches import intake
+from service.store.batches import stored_requests
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import results
@@ -308,7 +308,7 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
         with store.reading() as session:
             differs = 0
             for job_id in [*before, *spoilt]:
-                taken_in = intake.load_grading_request(session, job_id)
+                taken_in = stored_requests.load_grading_request(session, job_id)
                 job = session.get_one(Job, job_id)
                 query = select(Job).where(Job.submission_id == job.submission_id, Job.standing == Standing.STANDS)
                 stands = session.scalars(query).one()

@@ -29,8 +29,9 @@ from service.queue.notifier import Notifier
 from service.reports.plots.grade_plots import list_plots
 from service.settings import Settings
 from service.store import artifacts
-from service.store.batches import batches
-from service.store.batches.intake import accept_batch, load_grading_request
+from service.store.batches import job_lines
+from service.store.batches.intake import accept_batch
+from service.store.batches.stored_requests import load_grading_request
 from service.store.engine import Store, open_store
 from service.store.grades import results
 from service.store.installation import load_secret
@@ -137,10 +138,10 @@ def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service:
     assert "no robot program" in (by_student["lacking"].error or "")
 
 
-def _lines(service: Service, batch: str) -> list[batches.JobLine]:
+def _lines(service: Service, batch: str) -> list[job_lines.JobLine]:
     service.wait(batch)
     with service.store.reading() as session:
-        return batches.load_job_lines(session, batch)
+        return job_lines.load_job_lines(session, batch)
 
 
 def test_a_killed_worker_loses_nothing(service: Service) -> None:

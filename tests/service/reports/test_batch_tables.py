@@ -23,7 +23,7 @@ from service.grading.grade import Grade
 from service.reports.formats import FORMATS
 from service.reports.html import render_refusal_page
 from service.reports.rows import ReportPage, TableRow, describe_missing_part, select_student_rows
-from service.store.batches import batches
+from service.store.batches import job_lines
 from service.store.engine import Store
 from service.store.states import JobState
 from sim.errors import UsageError
@@ -277,7 +277,7 @@ def test_what_a_student_is_told_of_a_job_without_a_grade(
 ) -> None:
     accepted = accept_one(store)
     with store.reading() as session:
-        line = replace(batches.load_job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
+        line = replace(job_lines.load_job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
     row = build_row(line, None, describe_missing_grade(line))
     (shown,) = select_student_rows([row]) or [row]
     assert row.for_staff is for_staff

@@ -16,7 +16,7 @@ from service.batch_rows import describe_missing_grade
 from service.lti import passback
 from service.lti.services import Score
 from service.operations import own_submissions
-from service.store.batches import batch_table, batches
+from service.store.batches import batch_table, job_lines
 from service.store.batches.intake import accept_batch, accept_submission
 from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
@@ -58,10 +58,10 @@ def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
         found["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
         own = own_submissions.load_own_attempts(session, enrolment_id, "echo-responder").counting
         found["own page"] = None if own is None else own.job_id
-        lines = {"course": batches.load_course_lines(session, 1, ["echo-responder"])}
+        lines = {"course": job_lines.load_course_lines(session, 1, ["echo-responder"])}
         if batch_id is not None:
-            lines["batch"] = batches.load_job_lines(session, batch_id)
-            lines["some of a batch"] = batches.load_job_lines_page(session, batch_id, NOBODY, 10)
+            lines["batch"] = job_lines.load_job_lines(session, batch_id)
+            lines["some of a batch"] = job_lines.load_job_lines_page(session, batch_id, NOBODY, 10)
             (row,) = batch_table.load_table_lines(session, batch_id, (), NOBODY)
             found["table"] = row.id if row.marks is not None and not row.staff_only else None
         for name, (line,) in lines.items():
@@ -79,7 +79,7 @@ def test_a_newer_attempt_without_a_grade_leaves_the_marks_of_the_earlier_one(sto
         _end_next(store, how)
     assert set(_readers(store, batch.id).values()) == {batch.jobs[0].job_id}
     with store.reading() as session:
-        (line,) = batches.load_job_lines(session, batch.id)
+        (line,) = job_lines.load_job_lines(session, batch.id)
         (row,) = batch_table.load_table_lines(session, batch.id, (), NOBODY)
     assert (line.marks, line.newer_attempt, row.newer_attempt) == (GRADE.marks, 2, 2)
     exported = acting.export_file(store, batch.id, "moodle", published=True).data.decode()
@@ -94,9 +94,9 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
     _end_next(store)
     assert set(_readers(store, old.id).values()) == {newer}
     with store.reading() as session:
-        (line,) = batches.load_job_lines(session, old.id)
+        (line,) = job_lines.load_job_lines(session, old.id)
         (row,) = batch_table.load_table_lines(session, old.id, (), NOBODY)
-        (own,) = batches.load_attempt_lines(session, old.id)
+        (own,) = job_lines.load_attempt_lines(session, old.id)
     # The system that the batch came from recognises the student by that name.
     assert (line.attempt, line.source, row.elsewhere) == (2, "ada.zip", True)
     assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
@@ -148,7 +148,7 @@ def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) 
             session.execute(update(Job).values(state=state, standing=standing, suspect=suspect, lease=lease))
             session.execute(update(SubmissionRow).values(staff_only=staff_only))
         with store.reading() as session:
-            line = batches.load_job_line(session, job_id)
+            line = job_lines.load_job_line(session, job_id)
             asked = [select(Job.id).join(SubmissionRow).where(*which) for which in pairs.values()]
             found = [session.scalar(query) is not None for query in asked]
         assert [is_so(line) for is_so in pairs] == found, line

@@ -27,7 +27,7 @@ from service.reports.formats import FORMATS
 from service.reports.formats.json_output import build_json_document
 from service.reports.view import build_gradebook_view, build_staff_view, build_student_view
 from service.store import audit
-from service.store.batches import batch_table, batches, class_overview, regrades
+from service.store.batches import batch_table, class_overview, job_lines, regrades
 from service.store.batches.intake import accept_batch, accept_submission
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames
 from service.store.engine import Store
@@ -77,7 +77,7 @@ def _change(store: Store, job_id: str, *changes: Change) -> None:
 def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
     """Return marks and maximum marks from each reader of them."""
     with store.reading() as session:
-        (line,) = batches.load_job_lines(session, batch)
+        (line,) = job_lines.load_job_lines(session, batch)
         job = session.get_one(Job, line.id)
         grade = results.load_grade(session, line.id)
         counted = load_marked_submissions(session, [line])
@@ -146,7 +146,7 @@ def test_every_place_that_tells_marks_tells_the_same(
     _change(store, job_id, *changes)
     assert set(_totals(store, batch).values()) == {(marks, most)}
     with store.reading() as session:
-        rows = build_rows(store, batches.load_job_lines(session, batch))
+        rows = build_rows(store, job_lines.load_job_lines(session, batch))
         assert results.load_original_grade(session, job_id).criteria == GRADE.criteria
     # A gradebook has one maximum per assignment, so the other criteria replace the excused one.
     moodle = _csv(FORMATS["moodle"].table, rows)[0]["Grade"]
@@ -205,14 +205,14 @@ def test_a_copy_of_a_grade_has_the_graders_marks_and_not_what_was_set_for_anothe
     assert jobs.finish_job_from_cache(store, claim)
     copied = accept_submission(store, theirs[2], max_attempts=3)
     with store.reading() as session:
-        told = {job: batches.load_job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
-        assert batches.load_job_line(session, copied.job_id).copied_from == first.job_id
+        told = {job: job_lines.load_job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
+        assert job_lines.load_job_line(session, copied.job_id).copied_from == first.job_id
     assert list(told.values()) == [2, 7, 7]
     # An override of a submission also applies to a copied grade.
     _change(store, copied.job_id, _excuse(SHAPE))
     with store.reading() as session:
-        assert batches.load_job_line(session, copied.job_id).marks == 2
-        assert batches.load_job_line(session, first.job_id).max_marks == 8
+        assert job_lines.load_job_line(session, copied.job_id).marks == 2
+        assert job_lines.load_job_line(session, first.job_id).max_marks == 8
 
 
 def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) -> None:
@@ -223,14 +223,14 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
     _change(store, job_id, _set(SHAPE, "5"))
     assert set(_totals(store, batch).values()) == {(7, 8)}
     with store.reading() as session:
-        (line,) = batches.load_job_lines(session, batch)
+        (line,) = job_lines.load_job_lines(session, batch)
         told = build_staff_view(results.load_grade(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
     assert told.message == "Adjusted by staff to 5: seen again."
     assert acting.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
-        assert batches.load_job_line(session, job_id).unjudged == 1
+        assert job_lines.load_job_line(session, job_id).unjudged == 1
         (step, *_) = marking_history.load_history(session, session.get_one(Job, job_id).submission_id)
     assert (step.before, step.after, step.text) == ("not judged", "5", "seen again")
 
@@ -300,7 +300,7 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
         _change(store, job_id, partial(comments.add_comment, criterion=criterion, text=text, actor="staff"))
     with store.reading() as session:
         grade = results.load_grade(session, job_id)
-        line = batches.load_job_line(session, job_id)
+        line = job_lines.load_job_line(session, job_id)
     told = build_json_document(build_staff_view(grade))
     first, second = told["criteria"]
     assert first["message"].startswith("Adjusted by staff from 5 to 6: seen again. 5 of 6 images")
@@ -346,7 +346,7 @@ def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
     with store.reading() as session:
         lines = batch_table.load_table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
         (found,) = class_overview.compute_overviews(session, 1, lines, Decimal("0.6"), NO_HIDDEN_NAMES)
-        accuracies = {line.student: line.accuracy for line in batches.load_job_lines(session, batch.id)}
+        accuracies = {line.student: line.accuracy for line in job_lines.load_job_lines(session, batch.id)}
     # Ada has 3 of 6, so 4 of 8; Cid 7 of 8.
     statistics = found.statistics
     assert (statistics.n, statistics.mean, statistics.max_marks) == (2, 5.5, 8)

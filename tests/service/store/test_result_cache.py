@@ -14,7 +14,7 @@ from responders.sandbox.meter import JobCosts, JobLimits
 from service.commands.batch.batch_summary import list_remarks
 from service.grading.grade import Cost, Grade
 from service.store import artifacts
-from service.store.batches import batches
+from service.store.batches import job_lines
 from service.store.batches.intake import AcceptedSubmission, accept_batch, accept_submission
 from service.store.engine import Store
 from service.store.grades import plots, results
@@ -64,7 +64,7 @@ def test_an_identical_submission_has_the_grade_at_once_and_says_whose(store: Sto
         assert comparable(replace(copy, student=original.student)) == comparable(original)
         assert copy.cost == original.cost == cost
         assert artifacts.load_files(session, second.job_id, prefix="plot-")["plot-a.png"].data == b"image"
-        assert batches.load_job_line(session, second.job_id).copied_from == first
+        assert job_lines.load_job_line(session, second.job_id).copied_from == first
     # Copies of copies do not exist: the source is always the grade that was run.
     assert _accept(store, "eve").copied_from == first
 
@@ -99,7 +99,7 @@ def test_what_could_not_be_judged_is_told_and_never_copied(store: Store) -> None
     first = _grade_next(store, replace(GRADE, criteria=criteria))
     with store.reading() as session:
         assert results.load_grade(session, first).criteria[0].unjudged == criteria[0].unjudged
-        line = batches.load_job_line(session, first)
+        line = job_lines.load_job_line(session, first)
         assert metrics.collect_service_metrics(session).unjudged == 1
     assert "1 criteria not judged" in list_remarks(line)
     assert _accept(store, "bob").copied_from is None

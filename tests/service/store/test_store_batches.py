@@ -10,9 +10,9 @@ from sqlalchemy import func, select
 import acting
 from builders import echo, grading_request
 from service.operations.batches import BatchControlResult, RetryCounts
-from service.store.batches import batches
-from service.store.batches.batches import JobLine
+from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch, accept_new_submissions, accept_submission
+from service.store.batches.job_lines import JobLine
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import load_hidden_names
@@ -61,7 +61,7 @@ def test_a_batch_of_the_web_has_each_student_once_and_an_uploaded_one_says_nothi
         accept_submission(store, grading_request("ada", program), max_attempts=2, batch_id=web)
     with store.reading() as session:
         lines = {line.id: line for line in batches.list_batches(session)}
-        assert [line.attempt for line in batches.load_job_lines(session, web)] == [3]
+        assert [line.attempt for line in job_lines.load_job_lines(session, web)] == [3]
     assert (lines[web].jobs, lines[web].states) == (1, {JobState.QUEUED: 1})
     assert (lines[web].web_assignment, lines[web].takes_in) == (echo().id, True)
     assert (lines[uploaded].web_assignment, lines[uploaded].takes_in) == (None, False)
@@ -79,7 +79,7 @@ def test_lines_in_pages_miss_and_double_nothing_and_their_order_tells_no_hidden_
     names = load_hidden_names(store, 1)
     found: list[JobLine] = []
     with store.reading() as session:
-        while page := batches.load_job_lines_page(session, batch_id, names, 3, found[-1].id if found else None):
+        while page := job_lines.load_job_lines_page(session, batch_id, names, 3, found[-1].id if found else None):
             found += page
     assert len({line.id for line in found}) == len(found) == 8
     ordered = [line.id if hidden else line.student for line in found]

@@ -18,7 +18,7 @@ from service.reports.formats.json_output import build_json_document
 from service.reports.formats.text import render_plain_text
 from service.reports.view import build_staff_view
 from service.store import artifacts
-from service.store.batches.intake import load_grading_request
+from service.store.batches.stored_requests import load_grading_request
 from service.store.columns import make_storable
 from service.store.engine import Store
 from service.store.grades import results

@@ -16,7 +16,7 @@ from builders import accept_one, grading_request, settings_in
 from command import FORKING
 from service.operations.batches import BatchControlResult
 from service.settings import Settings
-from service.store.batches import batches
+from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
@@ -254,7 +254,7 @@ def test_a_batch_knows_how_far_it_is(store: Store) -> None:
     with store.reading() as session:
         progress = batches.load_progress(session, batch)
         line = batches.load_batch(session, batches.find_batch(session, batch[:8]))
-        lines = batches.load_job_lines(session, batch)
+        lines = job_lines.load_job_lines(session, batch)
     assert (progress.jobs, progress.ended, progress.partial, progress.plots_due) == (3, 1, 0.5, 1)
     assert line.states == {JobState.DONE: 1, JobState.RUNNING: 1, JobState.QUEUED: 1}
     assert line.refusals == (RejectedSubmission("odd.txt", "is odd."),)

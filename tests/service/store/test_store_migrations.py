@@ -22,7 +22,7 @@ from first_release import lay_first_release, lay_release_0_2_0
 from service.settings import Settings
 from service.store import artifacts, new_database
 from service.store.backup import back_up, restore
-from service.store.batches import batches, intake
+from service.store.batches import batches, job_lines, stored_requests
 from service.store.codec import decode
 from service.store.courses import open_assignments, policies
 from service.store.courses.policies import ExceededLimit
@@ -152,7 +152,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             ]
             assert counts == [2, 10, 3]
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
-            ada, bob = sorted(batches.load_job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
+            ada, bob = sorted(job_lines.load_job_lines(session, batch), key=lambda line: line.student == "Bob 🤖")
             graded = results.load_grade(session, ada.id)
             assert (graded.student, graded.marks, ada.standing) == ("ada", Decimal("1.00"), Standing.STANDS)
             assert len(graded.trials[0].recording.ticks) > 10
@@ -164,7 +164,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
             assert {(student, written) for student, written, _ in people} >= {("ada", "ada"), ("Bob 🤖", "Bob 🤖")}
             assert {name for _, _, name in people} == {""}
             assert artifacts.load_files(session, ada.id, prefix="plot-")["plot-path.png"].data.startswith(b"\x89PNG")
-            assert intake.load_grading_request(session, ada.id).submission.program is not None
+            assert stored_requests.load_grading_request(session, ada.id).submission.program is not None
         with store.engine.begin() as connection:
             command.check(build_alembic_config(connection))
         # The new release grades the waiting job, and new jobs get the next numbers.
@@ -193,7 +193,7 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
             assert session.scalar(select(func.count()).where(Job.published_at.is_not(None))) == 2
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
             assert batches.load_batch(session, batch).refusals == (RejectedSubmission("odd.txt", "is odd."),)
-            published = [line for line in batches.load_job_lines(session, batch) if line.marks is not None]
+            published = [line for line in job_lines.load_job_lines(session, batch) if line.marks is not None]
             assert sorted(line.marks for line in published if line.marks is not None) == [Decimal(0), Decimal(8)]
             for line in published:
                 assert results.load_grade(session, line.id).marks == line.marks
@@ -275,7 +275,7 @@ def test_what_was_submitted_on_the_web_before_it_had_a_batch_is_in_one(
         assert open_assignments.load_course_assignment(session, 1, "never").batch_id is None
         batch_id = open_assignments.load_course_assignment(session, 1, name).batch_id
         assert batch_id is not None
-        assert {line.student for line in batches.load_job_lines(session, batch_id)} == {"ada", "Bob 🤖", "eve"}
+        assert {line.student for line in job_lines.load_job_lines(session, batch_id)} == {"ada", "Bob 🤖", "eve"}
         assert batches.load_batch(session, batch_id).web_assignment == name
         assert session.scalar(select(func.count()).where(Job.batch_id.is_(None))) == 0
 

@@ -10,7 +10,7 @@ from sqlalchemy import event
 from sqlalchemy.orm import Session
 
 from builders import accept_one, opened, settings_in
-from service.store.batches import batches
+from service.store.batches import batches, job_lines
 from service.store.engine import Store, now
 from service.store.queue.scheduling import find_next_job
 
@@ -27,7 +27,7 @@ def sqlite(tmp_path: Path) -> Iterator[Store]:
         lambda session: find_next_job(session, now(session), "worker"),
         batches.list_batches,
         lambda session: batches.load_progress(session, "none"),
-        lambda session: batches.load_job_lines(session, "none"),
+        lambda session: job_lines.load_job_lines(session, "none"),
     ],
     ids=["claim", "batch list", "how far a batch is", "marks of a batch"],
 )

@@ -13,7 +13,7 @@ import acting
 import report_builders
 from builders import grading_request
 from service.operations.regrades import PublicationCounts
-from service.store.batches import batches
+from service.store.batches import job_lines
 from service.store.batches.intake import AcceptedSubmission, accept_batch, accept_new_submissions, accept_submission
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
@@ -103,9 +103,9 @@ def test_what_is_over_is_marked_but_neither_supersedes_nor_is_published(store: S
     assert batch is not None
     _grade_all(store)
     with store.reading() as session:
-        (own,) = batches.load_attempt_lines(session, batch)
+        (own,) = job_lines.load_attempt_lines(session, batch)
         assert (own.marks, own.staff_only) == (GRADE.marks, "attempt 2, allowed: 1")
-        (line,) = batches.load_job_lines(session, batch)
+        (line,) = job_lines.load_job_lines(session, batch)
         assert (line.id, line.newer_attempt) == (first.job_id, 3)
         assert session.get_one(Job, first.job_id).state is JobState.DONE
     assert acting.publish(store, batch, actor="staff") == PublicationCounts(0, 0, 0, 0, 1, 0)

@@ -9,7 +9,7 @@ from decimal import Decimal
 import report_builders
 from builders import echo, grading_request
 from service.grading.grade import CriterionResult, Evidence, Measure
-from service.store.batches import batches, rankings
+from service.store.batches import job_lines, rankings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
 from service.store.grades import overrides, results
@@ -25,7 +25,7 @@ def graded(store: Store, requests: list[GradingRequest], laps: dict[str, tuple[f
         claim = jobs.claim_job(store, "worker", 60)
         assert claim is not None
         with store.reading() as session:
-            student = batches.load_job_line(session, claim.job_id).student
+            student = job_lines.load_job_line(session, claim.job_id).student
         evidence = tuple(
             Evidence(0, lap is not None, "", measures=() if lap is None else (Measure("lap time", lap, "s"),))
             for lap in laps[student]
@@ -47,7 +47,7 @@ def test_a_batch_has_a_table_for_each_ranking(store: Store) -> None:
     requests = [replace(grading_request(student), assignment=circuit) for student in laps]
     batch = graded(store, requests, laps)
     with store.reading() as session:
-        (table,) = rankings.build_rank_tables(session, batches.load_job_lines(session, batch))
+        (table,) = rankings.build_rank_tables(session, job_lines.load_job_lines(session, batch))
     assert (table.assignment, table.measure, table.unit) == ("fastest-lap-of-thruxton", "lap time", "s")
     assert table.texts == [
         ("1=", "ada", "41.00", "28.29 to 53.71", "2 of 2"),
@@ -60,7 +60,7 @@ def test_a_batch_has_a_table_for_each_ranking(store: Store) -> None:
 def test_what_ranks_nothing_has_no_table(store: Store) -> None:
     batch = graded(store, [replace(grading_request("ada"), assignment=echo())], {"ada": (40.0,)})
     with store.reading() as session:
-        assert rankings.build_rank_tables(session, batches.load_job_lines(session, batch)) == []
+        assert rankings.build_rank_tables(session, job_lines.load_job_lines(session, batch)) == []
 
 
 def test_who_is_excused_from_a_ranking_has_no_place_in_it(store: Store) -> None:
@@ -69,7 +69,7 @@ def test_who_is_excused_from_a_ranking_has_no_place_in_it(store: Store) -> None:
     requests = [replace(grading_request(student), assignment=circuit) for student in laps]
     batch = graded(store, requests, laps)
     with store.transaction() as session:
-        ada, _ = batches.load_job_lines(session, batch)
+        ada, _ = job_lines.load_job_lines(session, batch)
         overrides.excuse_criterion(session, ada.id, "fast", "was ill", "grace")
-        (table,) = rankings.build_rank_tables(session, batches.load_job_lines(session, batch))
+        (table,) = rankings.build_rank_tables(session, job_lines.load_job_lines(session, batch))
     assert [row[1] for row in table.texts] == ["bob"]

@@ -17,7 +17,7 @@ from service.commands.batch.batch_summary import describe_unjudged
 from service.grading.grade import Grade
 from service.operations.regrades import PublicationCounts
 from service.store import audit
-from service.store.batches import batches, publishing, regrades
+from service.store.batches import batches, job_lines, publishing, regrades
 from service.store.batches.intake import accept_batch, accept_new_submissions
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES
 from service.store.engine import Store
@@ -59,7 +59,7 @@ def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = 
 def _standing(store: Store, batch: str) -> dict[str, str]:
     """Return the standing grade by student."""
     with store.reading() as session:
-        return {line.student: line.id for line in batches.load_job_lines(session, batch)}
+        return {line.student: line.id for line in job_lines.load_job_lines(session, batch)}
 
 
 def _changes(store: Store, batch: str) -> list[regrades.Change]:
@@ -114,7 +114,7 @@ def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
         assert claim is not None
         jobs.finish_job(store, claim, results.prepare_grade(claimed), datetime.now(UTC))
     with store.reading() as session:
-        lines = batches.load_job_lines(session, batch)
+        lines = job_lines.load_job_lines(session, batch)
     (left,) = [line for line in lines if line.unjudged]
     assert describe_unjudged(lines).startswith("1 submission has criteria that could not be judged")
     assert f": {left.student};" in describe_unjudged(lines)

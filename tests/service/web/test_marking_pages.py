@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 import report_builders
 from service.store import audit
-from service.store.batches import batches
+from service.store.batches import job_lines
 from service.store.courses.hidden_names import load_hidden_names
 from service.store.grades import results
 from web import Web, submit, web_in
@@ -35,7 +35,7 @@ class Marked:
 
     def marks(self) -> tuple[float, float]:
         with self.web.store.reading() as session:
-            line = batches.load_job_line(session, self.world.values["job_id"])
+            line = job_lines.load_job_line(session, self.world.values["job_id"])
         assert line.marks is not None
         return float(line.marks), float(line.max_marks)
 

@@ -20,7 +20,7 @@ from report_builders import faulty_grade
 from service.operations.context import Actor
 from service.operations.errors import NotFound
 from service.operations.submissions import SubmissionRequest
-from service.store.batches import intake
+from service.store.batches import intake, stored_requests
 from service.store.batches.intake import AcceptedSubmission
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
@@ -101,7 +101,7 @@ def test_files_and_archives_are_one_submission_each(
     accepted = _submit(web, ada, *files)
     with web.store.reading() as session:
         job = session.get_one(Job, accepted.job_id)
-        submission = intake.load_submission(session, accepted.job_id)
+        submission = stored_requests.load_submission(session, accepted.job_id)
         assert (job.lane, job.submission_id) == (JobQueue.INTERACTIVE, accepted.submission_id)
     assert [part and part.text for part in (submission.program, submission.responder)] == [PROGRAM, RESPONDER]
     assert not submission.files

@@ -15,7 +15,7 @@ import report_builders
 from builders import PROGRAM, echo
 from service.store import outbox as told_outbox
 from service.store import purge
-from service.store.batches import batches, publishing
+from service.store.batches import batches, job_lines, publishing
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
@@ -100,7 +100,7 @@ def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace
     grade_with(web)
     with web.store.reading() as session:
         found = {
-            line.student: (line.attempt, line.staff_only) for line in batches.load_job_lines(session, batch_of(web))
+            line.student: (line.attempt, line.staff_only) for line in job_lines.load_job_lines(session, batch_of(web))
         }
     assert found["ada"] == (1, None)
     assert found["bob"][1] is not None
@@ -177,4 +177,4 @@ def test_it_outlives_what_was_in_it_and_is_called_as_the_assignment(web: Web, gr
         assert session.get_one(Batch, batch).name == "Submitted on the web: Echo again"
     send(web, web.student("bob"))
     with web.store.reading() as session:
-        assert [line.student for line in batches.load_job_lines(session, batch)] == ["bob"]
+        assert [line.student for line in job_lines.load_job_lines(session, batch)] == ["bob"]
