@@ -45,6 +45,7 @@ _SUBMISSION_ERROR_SOURCES = [
         "file_kinds",
         "marked_run",
         "notebook",
+        "part_fitting",
         "raw_files",
         "source_text",
         "submission",

@@ -18,9 +18,10 @@ from submissions.archive_extraction import unzip
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_assignment, find_in_catalogue, read_assignment
-from submissions.bundle import build_submission, fit_parts, read_submission
+from submissions.bundle import build_submission, read_submission
 from submissions.downloads import IGNORED, DownloadedFiles, is_student_folder, list_student_files
 from submissions.grading_request import GradingRequest
+from submissions.part_fitting import fit_parts
 from submissions.raw_files import read_paths, sanitise_name
 from submissions.roster import RosterRow, read_roster, resolve_file
 from submissions.student_identity import People, RejectedSubmission, Student

@@ -23,6 +23,10 @@ from submissions.source_text import decode_source
 Part = Literal["program", "responder"]
 #: File name of each part.
 PART_FILES: Mapping[Part, str] = MappingProxyType({"program": "robot.py", "responder": "responder.py"})
+#: Part of each file name, in lower case.
+PARTS_BY_FILE: Mapping[str, Part] = MappingProxyType(
+    {"robot.py": "program", "program.py": "program", "responder.py": "responder"}
+)
 #: File name of the second robot's program, which is among the additional files.
 SECOND_PROGRAM = "robot2.py"
 META_FILE = "submission.toml"

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
 from service.commands.options import apply_channel_flags
 from service.commands.output import print_note, print_renderables
 from service.commands.sandbox_warning import warn_about_missing_sandbox
@@ -28,7 +28,8 @@ from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment, find_in_catalogue
-from submissions.bundle import derive_student_name, fit_parts, read_submission
+from submissions.bundle import derive_student_name, read_submission
+from submissions.part_fitting import fit_parts
 from submissions.raw_files import sanitise_name
 from submissions.student_identity import Student
 from submissions.student_names import describe_look_alikes, find_look_alikes, normalise_name

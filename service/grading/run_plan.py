@@ -30,12 +30,12 @@ from sim.motion import Rectangle
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.other_parts import SAME
-from submissions.bundle import find_missing_part
 from submissions.criteria.code import Functions, SourceRules
 from submissions.diagram_cells import read_diagrams
 from submissions.magics import Flags
 from submissions.marked_run import RunChoice, choose_run
 from submissions.notebook_python import extract_python
+from submissions.part_fitting import find_missing_part
 from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed, compute_world_seed
 from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
 

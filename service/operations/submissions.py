@@ -19,8 +19,9 @@ from service.store.models import Course
 from service.store.states import JobQueue, Role
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
-from submissions.bundle import build_submission, find_empty_parts, find_missing_part
+from submissions.bundle import build_submission
 from submissions.grading_request import GradingRequest
+from submissions.part_fitting import find_empty_parts, find_missing_part
 from submissions.raw_files import MEGABYTE, UploadedFile, read_uploaded, sanitise_name
 from submissions.student_identity import Student
 from submissions.submission import PART_FILES

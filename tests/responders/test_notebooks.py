@@ -23,7 +23,8 @@ from sim.recording import Verdict
 from submissions.assignment.definition import Parts
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import fit_parts, read_submission
+from submissions.bundle import read_submission
+from submissions.part_fitting import fit_parts
 from submissions.stored_submission import pack_submission, unpack_submission
 
 

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from responders.source_file import SourceFile
 from sim.errors import UsageError
 from submissions.assignment.definition import Parts
-from submissions.bundle import fit_parts, read_submission
+from submissions.bundle import read_submission
+from submissions.part_fitting import fit_parts
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, read_zip_bytes
 from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.student_names import normalise_name

@@ -11,8 +11,9 @@ import pytest
 from notebook_builder import notebook
 from sim.errors import UsageError
 from submissions.assignment.reader import find_assignment
-from submissions.bundle import fit_parts, read_submission
+from submissions.bundle import read_submission
 from submissions.marked_run import RunChoice, choose_run
+from submissions.part_fitting import fit_parts
 from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.submission import Submission
 

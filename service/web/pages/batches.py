@@ -29,7 +29,7 @@ from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.batch_folder import BatchContents
-from submissions.bundle import find_empty_parts, find_missing_part
+from submissions.part_fitting import find_empty_parts, find_missing_part
 from submissions.raw_files import UploadedFile, sanitise_name
 from submissions.student_identity import read_people
 from submissions.submission import PART_FILES
