@@ -6,9 +6,7 @@ The only change is that the home folder is created.
 
 from __future__ import annotations
 
-import base64
 import errno
-import hashlib
 import os
 import platform
 import shutil
@@ -20,7 +18,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from importlib import metadata
-from pathlib import Path
 
 import redis
 import structlog
@@ -29,6 +26,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from responders.sandbox import control_group
 from service.home import open_home
+from service.installed_files import check_installed_files
 from service.queue.broker import create_broker_client, fetch_broker_version, is_broker_responding, prepare_socket_path
 from service.queue.live_workers import is_worker_running
 from service.settings import Settings
@@ -43,8 +41,6 @@ from service.version import GRADER_VERSION, describe_release_problem
 from sim.errors import RobomarkError
 from submissions.seeds import format_secret_name
 
-#: Packages of the distribution, next to its metadata.
-_PACKAGES = frozenset({"robomark", "sim", "models", "responders", "submissions", "service"})
 _FREE_BYTES = 1_000_000_000
 _OLDEST_BROKER = (6, 2)
 _CLOCK_DIFFERENCE_SECONDS = 5.0
@@ -132,32 +128,6 @@ def _check_python(_settings: Settings) -> tuple[bool, str]:
         f"{platform.python_implementation()} {platform.python_version()} on {sys.platform} {platform.machine()}"
     )
     return is_supported, description if is_supported else f"{description}; PyBullet needs CPython 3.11 on x86-64 Linux"
-
-
-def _check_installed_files(_settings: Settings) -> tuple[bool, str]:
-    """Check that the installed files are unchanged: another distribution may contain a ``models/`` folder, too."""
-    recorded_files = [file for file in metadata.files("robomark") or () if file.hash is not None]
-    own_files = [file for file in recorded_files if file.parts[0] in _PACKAGES]
-    if not own_files:
-        return True, "an editable installation, so its files cannot be compared with a record"
-    changes = sorted(str(file) for file in own_files if not _is_unchanged(file))
-    if not changes:
-        return True, f"{len(own_files)} files are unchanged since installation"
-    other_changes = f" and {len(changes) - 1} more" if len(changes) > 1 else ""
-    return (
-        False,
-        f"{changes[0]}{other_changes} changed since installation, perhaps by another package: install robomark again",
-    )
-
-
-def _is_unchanged(file: metadata.PackagePath) -> bool:
-    assert file.hash is not None
-    try:
-        data = Path(str(file.locate())).read_bytes()
-    except OSError:
-        return False
-    digest = base64.urlsafe_b64encode(hashlib.new(file.hash.mode, data).digest())
-    return digest.rstrip(b"=").decode() == file.hash.value
 
 
 def _check_simulator(_settings: Settings) -> tuple[bool, str]:
@@ -397,7 +367,7 @@ def _open_usable_store(settings: Settings) -> Iterator[Store | None]:
 CHECKS = (
     Check("release", _check_release, _check_service_release),
     Check("Python", _check_python),
-    Check("files", _check_installed_files),
+    Check("files", check_installed_files),
     Check("simulator", _check_simulator),
     Check("sandbox", _check_sandbox, _check_worker_sandboxes),
     Check("control groups", _check_control_groups),

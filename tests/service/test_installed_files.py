@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from service import doctor
+from service import installed_files
 from service.settings import Settings
 
 
@@ -33,7 +33,10 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_files_as_recorded_are_well(installed: Path) -> None:
-    assert doctor._check_installed_files(Settings(home=installed)) == (True, "2 files are unchanged since installation")
+    assert installed_files.check_installed_files(Settings(home=installed)) == (
+        True,
+        "2 files are unchanged since installation",
+    )
 
 
 @pytest.mark.parametrize("name", ["models/__init__.py", "sim/world.py"])
@@ -43,10 +46,10 @@ def test_a_file_that_another_package_replaced_is_named(installed: Path, name: st
         (installed / name).unlink()
     else:
         (installed / name).write_text("theirs\n")
-    well, sentence = doctor._check_installed_files(Settings(home=installed))
+    well, sentence = installed_files.check_installed_files(Settings(home=installed))
     assert (well, name in sentence) == (False, True)
 
 
 def test_an_editable_installation_says_that_it_has_no_record(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("importlib.metadata.files", lambda _name: [])
-    assert doctor._check_installed_files(Settings(home=tmp_path))[0]
+    assert installed_files.check_installed_files(Settings(home=tmp_path))[0]
