@@ -10,7 +10,7 @@ from service.settings import Settings
 from service.store import audit
 from service.store.engine import Store as Store
 from service.store.engine import open_store as open_store
-from service.store.people.credentials import UNLIMITED_REACH, Reach
+from service.store.people.reach import UNLIMITED_REACH, Reach
 from service.store.states import JobQueue, Role
 
 

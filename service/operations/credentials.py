@@ -12,7 +12,8 @@ from service.operations.errors import Conflict, Forbidden, Invalid, NotFound
 from service.operations.scopes import list_offered_scopes
 from service.store import audit
 from service.store.people import credentials
-from service.store.people.credentials import MAX_TOKENS, CredentialLine, Reach
+from service.store.people.credentials import MAX_TOKENS, CredentialLine
+from service.store.people.reach import Reach
 from service.store.states import Role
 
 

@@ -11,8 +11,9 @@ from service.operations.context import Service
 from service.operations.errors import Invalid
 from service.store import audit
 from service.store.people import credentials, lti
-from service.store.people.credentials import SESSION_LIFETIME, NewSession, Reach
+from service.store.people.credentials import SESSION_LIFETIME, NewSession
 from service.store.people.lti import LaunchResult
+from service.store.people.reach import Reach
 from service.store.states import CredentialKind
 
 

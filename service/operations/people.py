@@ -17,8 +17,9 @@ from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
 from service.store.models import Enrolment, Person
 from service.store.people import credentials, membership
-from service.store.people.credentials import CredentialLine, Reach
+from service.store.people.credentials import CredentialLine
 from service.store.people.membership import Member as Member
+from service.store.people.reach import Reach
 from service.store.people.students import Students
 from service.store.purge import remove_student
 from service.store.states import CredentialKind, Role

@@ -24,8 +24,9 @@ from service.operations.lookup import (
 from service.store import audit
 from service.store.engine import now
 from service.store.people import credentials, membership
-from service.store.people.credentials import LINK_LIFETIME, UNLIMITED_REACH, Reach
+from service.store.people.credentials import LINK_LIFETIME
 from service.store.people.membership import Member
+from service.store.people.reach import UNLIMITED_REACH, Reach
 from service.store.people.students import DEFAULT_COURSE
 from service.store.states import Role
 from sim.errors import UsageError

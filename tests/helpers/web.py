@@ -25,8 +25,8 @@ from service.settings import Settings
 from service.store.engine import Store
 from service.store.grades import results
 from service.store.people import credentials, membership
-from service.store.people.credentials import Reach
 from service.store.people.membership import Member
+from service.store.people.reach import Reach
 from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.web.app import make_app

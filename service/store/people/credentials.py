@@ -19,8 +19,16 @@ from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
 from service.store.ids import generate_id
 from service.store.models import Enrolment, Person
+from service.store.people.reach import (
+    UNLIMITED_REACH,
+    Reach,
+    build_reach,
+    build_reach_columns,
+    match_reached_credentials,
+    match_reached_enrolments,
+)
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential, LtiCourse
+from service.store.web_tables import Credential
 
 SESSION_LIFETIME = timedelta(days=7)
 LINK_LIFETIME = timedelta(days=2)
@@ -30,24 +38,6 @@ MAX_SESSIONS, MAX_TOKENS = 20, 20
 _PREFIXES = {CredentialKind.LINK: "rml_", CredentialKind.SESSION: "rms_", CredentialKind.TOKEN: "rmt_"}
 _RETENTION = timedelta(days=30)
 _USE_INTERVAL = timedelta(hours=1)
-
-
-@dataclass(frozen=True, slots=True)
-class Reach:
-    """Limits of a credential: never beyond the course, role, platform and scopes of its issuer."""
-
-    course_id: int | None = None
-    role: Role | None = None
-    platform_id: int | None = None
-    scopes: frozenset[str] = frozenset()  # empty: all scopes for a session, none for a token
-
-    @property
-    def is_unlimited(self) -> bool:
-        """Return whether it reaches every course of its owner in every role."""
-        return self.course_id is None and self.role is None and self.platform_id is None
-
-
-UNLIMITED_REACH = Reach()
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +107,14 @@ def issue_credential(
         expires_at, token_id = min(expires_at, token.expires_at), token.id
     session.add(
         _build_row(
-            person_id, kind, secret, current_time, expires_at, name=name, token_id=token_id, **_build_columns(reach)
+            person_id,
+            kind,
+            secret,
+            current_time,
+            expires_at,
+            name=name,
+            token_id=token_id,
+            **build_reach_columns(reach),
         )
     )
     session.flush()
@@ -159,7 +156,7 @@ def create_token(
         created_at=current_time,
         expires_at=expires_at,
         token_id=None if token is None else token.id,
-        **_build_columns(reach),
+        **build_reach_columns(reach),
     )
 
 
@@ -197,7 +194,7 @@ def replace_links(
         update(Credential).where(*links, Credential.person_id.in_(person_ids)).values(revoked_at=current_time)
     )
     secrets_by_person = {person_id: build_link_secret(word or secrets.token_urlsafe(32)) for person_id in person_ids}
-    limits = _build_columns(reach)
+    limits = build_reach_columns(reach)
     session.add_all(
         _build_row(who, CredentialKind.LINK, secret, current_time, current_time + lifetime, **limits)
         for who, secret in secrets_by_person.items()
@@ -216,7 +213,11 @@ def find_link_owner(session: Session, link: str) -> LinkOwner | None:
     row = _find_valid(session, link, CredentialKind.LINK)
     if row is None:
         return None
-    return LinkOwner(row.person_id, load_person_name(session, row.person_id, row.course_id), row.expires_at)
+    query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == row.person_id)
+    if row.course_id is not None:
+        query = query.where(Enrolment.course_id == row.course_id)
+    names = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).tuples().all()
+    return LinkOwner(row.person_id, _choose_name(row.person_id, names), row.expires_at)
 
 
 def redeem_link(session: Session, link: str) -> NewSession | None:
@@ -231,7 +232,7 @@ def redeem_link(session: Session, link: str) -> NewSession | None:
     if session.execute(statement).rowcount != 1:  # type: ignore[attr-defined]
         return None
     return NewSession(
-        issue_credential(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=_build_reach(row))
+        issue_credential(session, row.person_id, CredentialKind.SESSION, SESSION_LIFETIME, reach=build_reach(row))
     )
 
 
@@ -245,7 +246,7 @@ def start_session(session: Session, token: str) -> NewSession | None:
         return None
     kind, lifetime = CredentialKind.SESSION, min(SESSION_LIFETIME, row.expires_at - now(session))
     return NewSession(
-        issue_credential(session, row.person_id, kind, lifetime, reach=_build_reach(row), token=row), lifetime
+        issue_credential(session, row.person_id, kind, lifetime, reach=build_reach(row), token=row), lifetime
     )
 
 
@@ -254,8 +255,8 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
     row = _find_valid(session, secret, kind)
     if row is None:
         return None
-    reach = _build_reach(row)
-    reach_conditions = _match_enrolments(reach)
+    reach = build_reach(row)
+    reach_conditions = match_reached_enrolments(reach)
     query = select(Person.operator, Enrolment, and_(*reach_conditions) if reach_conditions else true())
     query = query.outerjoin(Enrolment, Enrolment.person_id == Person.id).where(Person.id == row.person_id)
     enrolment_rows = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
@@ -284,13 +285,13 @@ def record_use(session: Session, credential_id: str) -> None:
 def revoke_credential(session: Session, credential_id: str, person_id: int, reach: Reach = UNLIMITED_REACH) -> bool:
     """Revoke a credential. Returns False if this person does not have it within ``reach``."""
     conditions = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
-    return _revoke(session, *conditions, *_match_credentials(reach)) == 1
+    return _revoke(session, *conditions, *match_reached_credentials(reach)) == 1
 
 
 def revoke_all(session: Session, person_id: int, *, kept_id: str = "", reach: Reach = UNLIMITED_REACH) -> int:
     """Revoke all links, sessions and tokens of a person within ``reach`` except one. Returns the number revoked."""
     conditions = (Credential.person_id == person_id, Credential.id != kept_id, *_match_valid(now(session)))
-    return _revoke(session, *conditions, *_match_credentials(reach))
+    return _revoke(session, *conditions, *match_reached_credentials(reach))
 
 
 def revoke_for_course(session: Session, person_id: int, course_id: int) -> int:
@@ -320,7 +321,7 @@ def list_credentials(session: Session, person_id: int, reach: Reach = UNLIMITED_
         Credential.person_id == person_id,
         is_listed_kind,
         *_match_valid(now(session)),
-        *_match_credentials(reach),
+        *match_reached_credentials(reach),
     )
     return [
         CredentialLine(
@@ -332,58 +333,10 @@ def list_credentials(session: Session, person_id: int, reach: Reach = UNLIMITED_
     ]
 
 
-def load_person_name(session: Session, person_id: int, course_id: int | None = None) -> str:
-    """Return a person's name in the course; without a course, the name in any course, preferring those they teach.
-
-    Falls back to the person's id.
-    """
-    query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == person_id)
-    if course_id is not None:
-        query = query.where(Enrolment.course_id == course_id)
-    name_rows = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
-    return _choose_name(person_id, [(name, written) for name, written in name_rows])
-
-
 def _choose_name(person_id: int, names_and_ids: Sequence[tuple[str, str]]) -> str:
-    """Return the first name among a person's enrolments, otherwise the first id."""
+    """Return the first name among a person's enrolments, otherwise the first id there, otherwise the person's id."""
     names = [name for name, _ in names_and_ids if name] or [written for _, written in names_and_ids if written]
     return names[0] if names else f"person {person_id}"
-
-
-def _build_reach(row: Credential) -> Reach:
-    return Reach(row.course_id, row.role, row.platform_id, frozenset(row.scopes))
-
-
-def _build_columns(reach: Reach) -> dict[str, Any]:
-    return {
-        "course_id": reach.course_id,
-        "role": reach.role,
-        "platform_id": reach.platform_id,
-        "scopes": sorted(reach.scopes),
-    }
-
-
-def _match_enrolments(reach: Reach) -> list[ColumnElement[bool]]:
-    """Return the conditions for the enrolments within a credential's reach."""
-    conditions: list[ColumnElement[bool]] = []
-    if reach.course_id is not None:
-        conditions.append(Enrolment.course_id == reach.course_id)
-    if reach.role is not None:
-        conditions.append(Enrolment.role == reach.role)
-    if reach.platform_id is not None:
-        launched_courses = select(LtiCourse.course_id).where(LtiCourse.platform_id == reach.platform_id)
-        conditions.append(Enrolment.course_id.in_(launched_courses))
-    return conditions
-
-
-def _match_credentials(reach: Reach) -> list[ColumnElement[bool]]:
-    """Return the conditions for credentials within this reach: only these may be viewed and revoked with it."""
-    limits = (
-        (Credential.course_id, reach.course_id),
-        (Credential.role, reach.role),
-        (Credential.platform_id, reach.platform_id),
-    )
-    return [column == limit for column, limit in limits if limit is not None]
 
 
 def _match_valid(current_time: datetime) -> tuple[ColumnElement[bool], ...]:

@@ -22,6 +22,7 @@ from service.store.engine import Store
 from service.store.grades import results
 from service.store.models import Course
 from service.store.people import credentials, membership, webhooks
+from service.store.people.reach import Reach
 from service.store.queue import jobs
 from service.store.states import CredentialKind
 from service.store.web_tables import Delivery
@@ -190,7 +191,7 @@ def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
             CredentialKind.TOKEN,
             timedelta(hours=1),
             name="t",
-            reach=credentials.Reach(scopes=frozenset({"read"})),
+            reach=Reach(scopes=frozenset({"read"})),
         )
         (token,) = credentials.list_credentials(session, person_id)
     asked = (service_on(store), Actor("grace", person_id, credential_id=token.id), "k")

@@ -27,6 +27,7 @@ from service.store.engine import Store
 from service.store.grades import marking_history, results
 from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import credentials, membership
+from service.store.people.reach import Reach
 from service.store.people.students import ensure_course
 from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
@@ -83,7 +84,7 @@ def everything(store: Store) -> int:
             CredentialKind.TOKEN,
             timedelta(days=1),
             name=KNOWN[1],
-            reach=credentials.Reach(scopes=frozenset({"read"})),
+            reach=Reach(scopes=frozenset({"read"})),
         )
         session.flush()
         token = credentials.list_credentials(session, person_id)[0].id
@@ -150,7 +151,7 @@ def test_stored_replies_and_waiting_uploads_of_the_course_are_erased(store: Stor
                 CredentialKind.TOKEN,
                 timedelta(days=1),
                 name="t",
-                reach=credentials.Reach(scopes=frozenset({"read"})),
+                reach=Reach(scopes=frozenset({"read"})),
             )
             token = credentials.list_credentials(session, member.person_id)[0].id
             for key, status in (("done", 201), ("in progress", 0)):

@@ -24,8 +24,8 @@ from service.store.batches import intake
 from service.store.engine import Store, now
 from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials, lti, membership
-from service.store.people.credentials import Reach
 from service.store.people.lti import CourseLink, LaunchResult, Platform, Registration
+from service.store.people.reach import UNLIMITED_REACH, Reach
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson
@@ -73,7 +73,7 @@ def launch(
         return launched
 
 
-def sign_in(session: Session, person_id: int, reach: Reach = credentials.UNLIMITED_REACH) -> None:
+def sign_in(session: Session, person_id: int, reach: Reach = UNLIMITED_REACH) -> None:
     """Create a session of this person."""
     credentials.issue_credential(session, person_id, CredentialKind.SESSION, credentials.SESSION_LIFETIME, reach=reach)
 

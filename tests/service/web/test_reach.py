@@ -20,9 +20,10 @@ from service.operations.scopes import SCOPES
 from service.store.engine import now
 from service.store.models import Enrolment
 from service.store.people import credentials, lti, membership
-from service.store.people.credentials import MAX_SESSIONS, MAX_TOKENS, Reach
+from service.store.people.credentials import MAX_SESSIONS, MAX_TOKENS
 from service.store.people.lti import Registration
 from service.store.people.membership import Member
+from service.store.people.reach import Reach
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential, LtiCourse, LtiPerson

@@ -12,6 +12,7 @@ from sqlalchemy import select
 from command import robomark
 from service.store.people import credentials, membership
 from service.store.people.membership import Member
+from service.store.people.reach import Reach
 from service.store.states import CredentialKind, Role
 from service.store.web_tables import Credential
 from service.web.access import SESSION_COOKIE
@@ -87,7 +88,7 @@ def test_a_token_becomes_a_browser_only_where_it_may(web: Web) -> None:
 
 
 def _token_for(web: Web, member: Member, lifetime: timedelta) -> str:
-    reach = credentials.Reach(scopes=frozenset({"sign-in"}))
+    reach = Reach(scopes=frozenset({"sign-in"}))
     with web.store.transaction() as session:
         return credentials.issue_credential(session, member.person_id, CredentialKind.TOKEN, lifetime, reach=reach)
 
@@ -125,7 +126,7 @@ def test_what_has_ended_counts_no_more(web: Web) -> None:
         link = credentials.issue_credential(session, ada.person_id, CredentialKind.LINK, past)
         secret = credentials.issue_credential(session, ada.person_id, CredentialKind.SESSION, past)
         token = credentials.issue_credential(
-            session, ada.person_id, CredentialKind.TOKEN, past, reach=credentials.Reach(scopes=frozenset({"read"}))
+            session, ada.person_id, CredentialKind.TOKEN, past, reach=Reach(scopes=frozenset({"read"}))
         )
         assert credentials.redeem_link(session, link) is None
         assert credentials.identify(session, secret, CredentialKind.SESSION) is None
