@@ -13,12 +13,12 @@ from typing import Any
 
 from responders.channel import Channel
 from responders.notebook_executor import ExecutedNotebook
+from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
 from service.commands.options import ChannelFlags, apply_channel_flags
 from service.commands.output import print_json, print_line, print_note
-from service.commands.run import MagicFlags, OutputFiles, RunConditions, TickLength
+from service.commands.run_options import MagicFlags, OutputFiles, RunConditions, TickLength
 from service.commands.sandbox_warning import warn_about_missing_sandbox
 from service.grading.grade import TrialResult
 from service.grading.standalone_runs import (
