@@ -28,8 +28,9 @@ from responders import wire
 from responders.sandbox.inside import grants, lockdown
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import ChildLimits, ServedChild
-from responders.sandbox.zygote import ChildRole
+from responders.sandbox.roles import ChildRole
+from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.served_child import ServedChild
 from sim.recording import TICK, Verdict
 
 _LIMITS = {"robot": ChildLimits(2, 128 << 20), "responder with libraries": ChildLimits(2, 512 << 20)}

@@ -6,7 +6,6 @@ sets a trial up and tears it down.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
@@ -17,15 +16,16 @@ from responders.faults import build_error_fault, build_stop_fault, describe_refu
 from responders.link import build_link
 from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox.meter import OBJECT_BYTES, ChildStopped, JobMeter
-from responders.sandbox.running_child import ServedChild
+from responders.sandbox.served_child import ServedChild
 from responders.trial_spec import TrialSpec
+from responders.trial_world import build_world, format_reading
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.drive import Wheel
 from sim.line_trace import LINE_BYTES, LineTrace
 from sim.random_streams import RandomStream
 from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, TimedText, Verdict
-from sim.world import HashChain, World
+from sim.world import HashChain
 
 _READ_TIME = 10 * MILLISECOND
 _WORDS_PER_MINUTE = 130
@@ -373,43 +373,3 @@ class Bridge:
         hint = "Let it sleep or read a sensor: the robot moves only while the program waits."
         sentence = f"{subject}, so the world cannot move"
         raise _TrialEnded(Fault(self.now / SECOND, Verdict.CPU_LIMIT, "program", sentence, line, hint, file=file or ""))
-
-
-def format_reading(reading: float | list[float]) -> str:
-    """Return the ``repr`` of a reading.
-
-    Lists of three equal values are common over a grey floor and take a faster path, because formatting floats is slow.
-    """
-    if isinstance(reading, list):
-        first = reading[0]
-        if first and reading.count(first) == len(reading):  # 0.0 and -0.0 are equal but have different reprs
-            return f"[{', '.join([repr(first)] * len(reading))}]"
-    return repr(reading)
-
-
-def build_world(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: HashChain) -> World:
-    """Return the world at the start of the trial."""
-    return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
-
-
-def build_robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:
-    """Return the robot's pose and sensor values, with the keys of the original ``%sim_robot_state``."""
-    readings = world.collect_readings()
-    state: dict[str, Any] = {
-        "x": world.pose.x,
-        "y": world.pose.y,
-        "angle": math.radians(world.pose.heading),
-        "ultrasonic": readings["ultrasonic"],
-        "gyro": readings["gyro"],
-        "penDown": spec.pen_down,
-        "_sensorNoise": spec.noise.light,
-        "_wheelNoise": spec.noise.motor,
-    }
-    for number, (side, image) in enumerate(zip(("left", "right"), world.render_images(), strict=True)):
-        rgb = readings[side]
-        state[f"sensor{number + 1}dataArray"] = message_format.format_csv(image)
-        state[f"{side}_light_raw"] = rgb
-        state[f"{side}_light"] = int(rgb[0])
-        state[f"{side}_light_pc"] = 100 * int(rgb[0]) / 255
-        state[f"{side}_light_full"] = 100 * sum(map(int, rgb)) / 765
-    return state

@@ -16,7 +16,7 @@ from responders.conversation import SentText
 from responders.link import InfraredLink
 from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox.meter import JobMeter
-from responders.sandbox.running_child import ServedChild
+from responders.sandbox.served_child import ServedChild
 from responders.trial_spec import TrialSpec
 from sim.camera import LightCamera
 from sim.recording import SECOND, Call, Fault, Verdict

@@ -13,13 +13,14 @@ from typing import Any, Protocol
 
 from responders import wire
 from responders.agents import AgentCounts, Agents, running_agents
-from responders.bridge import Bridge, build_robot_state, build_world
+from responders.bridge import Bridge
 from responders.logger_file import read_log
 from responders.notebook_process import NotebookProcess, NotebookSpec
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.trial import MAX_NOTES, build_recording
 from responders.trial_spec import TrialSpec
+from responders.trial_world import build_robot_state, build_world
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.motion import Rectangle

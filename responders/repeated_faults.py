@@ -22,7 +22,8 @@ from typing import Any
 from responders import wire
 from responders.logger_file import LOG_FILE
 from responders.sandbox.meter import OBJECT_BYTES, ChildStopped, JobMeter
-from responders.sandbox.running_child import Child, ServedChild
+from responders.sandbox.running_child import Child
+from responders.sandbox.served_child import ServedChild
 from sim.errors import RobomarkError
 from sim.recording import Fault, Recording, Verdict
 

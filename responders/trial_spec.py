@@ -15,8 +15,8 @@ from typing import Any, Literal
 from responders.channel import Channel
 from responders.libraries_needed import may_need_libraries
 from responders.sandbox.inside.libraries import LIBRARIES
+from responders.sandbox.roles import ChildRole
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import ChildRole
 from responders.source_file import SourceFile
 from sim.floors import Floor
 from sim.motion import COURSE_PHYSICS, Physics

@@ -15,18 +15,13 @@ from types import TracebackType
 from responders.sandbox import access_times
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.inside import grants
+from responders.sandbox.isolation import FULL_ISOLATION, Isolation
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import PrivateFolders
-from responders.sandbox.running_child import Child, ChildLimits, ServedChild
-from responders.sandbox.zygote import (
-    FULL_ISOLATION,
-    ROLES,
-    WITH_LIBRARIES,
-    ChildRole,
-    Isolation,
-    Zygote,
-    find_module_folder,
-)
+from responders.sandbox.roles import ROLES, WITH_LIBRARIES, ChildRole, find_module_folder
+from responders.sandbox.running_child import Child, ChildLimits
+from responders.sandbox.served_child import ServedChild
+from responders.sandbox.zygote import Zygote
 
 #: Returns a real or a replayed child, from its role, its folder, its job's meter and a function that creates it.
 ChildProvider = Callable[[str, Path | None, JobMeter | None, Callable[[], Child]], ServedChild]

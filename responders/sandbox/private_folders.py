@@ -1,7 +1,6 @@
 """Private folders of trials, all in one folder of the worker, and removed with their content.
 
-The sandbox decides which operations a student's process may perform in its folder. Its size is checked while the
-process runs.
+The sandbox decides which operations a student's process may perform in its folder. Here, its size is limited.
 """
 
 from __future__ import annotations
@@ -16,6 +15,10 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from responders.sandbox import process_state
+from responders.sandbox.meter import ChildStopped
+from sim.recording import Verdict
+
 _PREFIX = "robomark-trials-"
 #: Other users may traverse the folder, as children with their own user must, but not list it.
 _MODE = 0o711
@@ -23,6 +26,10 @@ _MODE = 0o711
 _INODES_PER_TRIAL = 1024
 #: Maximum number of low inodes reserved during a trial, several times the number that others use meanwhile.
 _MAX_RESERVED_INODES = 64
+#: Space for a child in its folder, in addition to the given files.
+_MAX_WRITTEN_BYTES = 16 << 20
+_MAX_WRITTEN_FILES = 256
+_MAX_GIVEN_FILES = 10_000
 
 
 class PrivateFolders:
@@ -92,6 +99,29 @@ class PrivateFolders:
             os.close(self._lock)
         self._path, self._lock = path, lock
         self._counting = len({_read_inode_number(path) for _ in range(4)}) == 4
+
+
+class FolderLimit:
+    """The limit on the files that a child adds to its folder."""
+
+    def __init__(self, folder: Path) -> None:
+        """``folder`` contains the given files."""
+        self._folder = folder
+        given_bytes, given_files = process_state.measure_folder(folder, _MAX_GIVEN_FILES)
+        self._max_bytes, self._max_files = given_bytes + _MAX_WRITTEN_BYTES, given_files + _MAX_WRITTEN_FILES
+
+    def check(self) -> None:
+        """Check the size of the folder, which is flat: the sandbox allows neither subfolders nor links.
+
+        Raises:
+            ChildStopped: If it has grown too large.
+        """
+        size, count = process_state.measure_folder(self._folder, self._max_files + 1)
+        if size > self._max_bytes or count > self._max_files:
+            raise ChildStopped(
+                Verdict.OUTPUT_LIMIT,
+                f"it wrote more than {_MAX_WRITTEN_BYTES >> 20} MB or {_MAX_WRITTEN_FILES} files into its folder",
+            )
 
 
 def _read_inode_number(folder: Path) -> int:

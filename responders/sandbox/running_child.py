@@ -14,12 +14,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from responders import packets, wire
 from responders.sandbox import child_exit, process_state
 from responders.sandbox.meter import ChildStopped, JobMeter
-from sim.errors import HostError, RobomarkError
+from responders.sandbox.private_folders import FolderLimit
+from responders.sandbox.served_child import LibrariesNeeded
+from sim.errors import HostError
 from sim.recording import Verdict
 
 _POLL_SECONDS = 0.02
@@ -40,10 +42,6 @@ _END_SECONDS = 1.0
 #: Frames that programs repeat thousands of times; each distinct one is validated once.
 _REPEATED_FRAMES = frozenset({"motor_state", "until"})
 _MAX_CACHED_FRAMES, _MAX_CACHED_LENGTH = 100, 200
-#: Space in a responder's folder, in addition to the given files.
-_FOLDER_BYTES = 16 << 20
-_FOLDER_FILES = 256
-_MAX_GIVEN_FILES = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,38 +51,6 @@ class ChildLimits:
     cpu_seconds: float
     memory_bytes: int
     excluded_modules: tuple[str, ...] = ()
-
-
-class LibrariesNeeded(RobomarkError):
-    """Raised when a child without libraries has imported one: the trial must be run again with libraries."""
-
-
-class ServedChild(Protocol):
-    """The interface of a child for the code that serves it."""
-
-    sandbox: str
-
-    def send(self, frame: dict[str, Any], entries: Sequence[str] = ()) -> None:
-        """Send one frame. ``entries`` holds JSON texts."""
-
-    def send_readings(self, units: int, values: Sequence[float]) -> None:
-        """Send readings, without arrivals."""
-
-    def receive(self, schema: wire.Schema) -> wire.Frame:
-        """Return the next frame.
-
-        Raises:
-            ChildStopped: If the child was stopped or has ended.
-        """
-
-    def measure_cpu_seconds(self) -> float:
-        """Return the CPU seconds of the child so far."""
-
-    def stop_and_locate(self) -> wire.Frame:
-        """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards."""
-
-    def close(self) -> None:
-        """End the child."""
 
 
 class Child:
@@ -106,8 +72,7 @@ class Child:
         """
         self.sandbox = ""
         self._reap = reap
-        self._folder = folder
-        self._initial_folder_size = (0, 0) if folder is None else process_state.measure_folder(folder, _MAX_GIVEN_FILES)
+        self._check_folder: Callable[[], None] = (lambda: None) if folder is None else FolderLimit(folder).check
         self._pid = pid
         self._pidfd = pidfd
         # A round trip over pipes costs little more than half of one over a socket.
@@ -274,9 +239,22 @@ class Child:
     def stop_and_locate(self) -> wire.Frame:
         """Return the current ``line`` and ``file`` of the child, and stop it: it can't be served afterwards.
 
-        A child that waits for a reply reports the same line in every run.
+        A child that waits for a reply reports the same line in every run. The wait for its report is short.
         """
-        return self._request_place()
+        with contextlib.suppress(OSError):
+            signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
+        deadline = time.monotonic() + _LAST_PLACE_SECONDS
+        cpu_deadline = self.measure_cpu_seconds() + _LAST_PLACE_CPU_SECONDS
+        data = self._pending
+        while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < cpu_deadline:
+            if time.monotonic() > deadline and not process_state.is_runnable(self._pid):
+                break
+            if self._reply_poll.poll(_POLL_SECONDS * 1000):
+                new_data = os.read(self._reading, wire.MAX_FRAME_BYTES)
+                if not new_data:
+                    break
+                data += new_data
+        return child_exit.parse_location(data)
 
     def close(self) -> None:
         """Kill the child and wait until it has ended."""
@@ -338,7 +316,7 @@ class Child:
         if charged_seconds > self._limits.cpu_seconds:
             if self.measured:
                 self._watch_beyond_limit(is_computing=True)
-            raise child_exit.build_cpu_stop(self._limits.cpu_seconds, self._request_place())
+            raise child_exit.build_cpu_stop(self._limits.cpu_seconds, self.stop_and_locate())
         self._meter.check_cpu(charged_seconds)
         return cpu_seconds
 
@@ -380,38 +358,6 @@ class Child:
             - (process_state.read_queued_seconds() - self._queued_before),
         )
 
-    def _check_folder(self) -> None:
-        """Check the size of the folder. It is flat, because the sandbox allows neither subfolders nor links."""
-        if self._folder is None:
-            return
-        max_bytes, max_files = (
-            self._initial_folder_size[0] + _FOLDER_BYTES,
-            self._initial_folder_size[1] + _FOLDER_FILES,
-        )
-        size, count = process_state.measure_folder(self._folder, max_files + 1)
-        if size > max_bytes or count > max_files:
-            raise ChildStopped(
-                Verdict.OUTPUT_LIMIT,
-                f"it wrote more than {_FOLDER_BYTES >> 20} MB or {_FOLDER_FILES} files into its folder",
-            )
-
-    def _request_place(self) -> wire.Frame:
-        """Ask the child for its current place and wait briefly for the reply."""
-        with contextlib.suppress(OSError):
-            signal.pidfd_send_signal(self._pidfd, signal.SIGXCPU)
-        deadline = time.monotonic() + _LAST_PLACE_SECONDS
-        cpu_deadline = self.measure_cpu_seconds() + _LAST_PLACE_CPU_SECONDS
-        data = self._pending
-        while len(data) < _UNREAD_BYTES and self.measure_cpu_seconds() < cpu_deadline:
-            if time.monotonic() > deadline and not process_state.is_runnable(self._pid):
-                break
-            if self._reply_poll.poll(_POLL_SECONDS * 1000):
-                new_data = os.read(self._reading, wire.MAX_FRAME_BYTES)
-                if not new_data:
-                    break
-                data += new_data
-        return child_exit.parse_location(data)
-
     def _build_stall_stop(self) -> ChildStopped:
         return ChildStopped(
             Verdict.STALLED,
@@ -448,10 +394,7 @@ class Child:
             # The extra time for measuring is not charged.
             cpu_seconds, slept = min(cpu_seconds, self._limits.cpu_seconds), min(slept, _STALLED_SECONDS)
         self._meter.charge_child(cpu_seconds, slept)
-        self._kill()
-        for fd in (self._reading, self._writing, self._pidfd):
-            os.close(fd)
-
-    def _kill(self) -> None:
         with contextlib.suppress(OSError):
             signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+        for fd in (self._reading, self._writing, self._pidfd):
+            os.close(fd)

@@ -9,8 +9,6 @@ from __future__ import annotations
 import array
 import contextlib
 import functools
-import importlib.machinery
-import importlib.util
 import json
 import os
 import select
@@ -18,23 +16,21 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
-from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from collections.abc import Set
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal
 
 from responders import wire
 from responders.sandbox import bubblewrap, zygote_command
 from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.isolation import Isolation, build_missing_error, describe_layers
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
+from responders.sandbox.roles import WITH_LIBRARIES, ChildRole, compile_bytecode, find_module_folder
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.errors import HostError
 
-ChildRole = Literal["robot", "robot with libraries", "responder", "responder with libraries"]
 ChildWork = Literal["role", "battery"]
 
 _SANDBOX_FOLDER = Path(__file__).resolve().parent
@@ -46,61 +42,10 @@ _MAX_PROCESSORS = 1024
 #: Report of an ended child: wait status, and user and system time as seconds and microseconds.
 _EXIT_REPORT = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
-_FOLDERS: dict[ChildRole, tuple[str, str]] = {
-    "robot": ("sim", "brick"),
-    "robot with libraries": ("sim", "brick"),
-    "responder": ("responders", "kit"),
-    "responder with libraries": ("responders", "kit"),
-}
-ROLES: tuple[ChildRole, ...] = tuple(_FOLDERS)
-#: Each role and its variant with loaded libraries.
-WITH_LIBRARIES: Mapping[ChildRole, ChildRole] = MappingProxyType(
-    {
-        "robot": "robot with libraries",
-        "robot with libraries": "robot with libraries",
-        "responder": "responder with libraries",
-        "responder with libraries": "responder with libraries",
-    }
-)
-
-
-class SandboxMissing(HostError):
-    """Raised when this machine can't provide the sandbox that student code needs."""
 
 
 class _ZygoteEnded(KilledFromOutside):
     """Raised when a zygote has ended, and all of its children with it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Isolation:
-    """The requested layers: Landlock up to a version of its interface (0 for none), and the system call filter.
-
-    The doorkeeper and bubblewrap are optional: they are used where they work.
-    """
-
-    landlock: int = 99
-    seccomp: bool = True
-    doorkeeper: bool = True
-    bubblewrap: bool = True
-
-
-#: Required for every grading.
-FULL_ISOLATION = Isolation()
-#: Only limits on the process, for development.
-NO_ISOLATION = Isolation(landlock=0, seccomp=False, doorkeeper=False, bubblewrap=False)
-
-
-def describe_layers(active_layers: wire.Frame, bubblewrap: bool, control_group: bool) -> str:
-    """Return the sandbox layers as shown in grades and reports."""
-    layers = [f"Landlock {active_layers['landlock']}"] * bool(active_layers["landlock"]) + ["seccomp"] * active_layers[
-        "seccomp"
-    ]
-    layers += ["doorkeeper"] * (active_layers["without_doorkeeper"] is None) + ["own user"] * active_layers["own_user"]
-    layers += ["bubblewrap"] * bubblewrap + ["control group"] * control_group
-    layers += ["fixed addresses"] * (bool(layers) and active_layers["fixed_addresses"])
-    policy = active_layers["policy"]
-    return ", ".join([*layers, "process limits", f"policy {policy}"]) if layers else "process limits only"
 
 
 class Zygote:
@@ -170,11 +115,11 @@ class Zygote:
         try:
             report = child.receive(wire.BATTERY)
         except ChildStopped as stop:
-            raise _build_missing_error(f"the battery of escapes did not come to its end ({stop.message})") from None
+            raise build_missing_error(f"the battery of escapes did not come to its end ({stop.message})") from None
         finally:
             child.close()
         if report["through"] and self._sandbox.landlock and self._sandbox.seccomp:
-            raise _build_missing_error(f"they let through: {', '.join(str(name)[:60] for name in report['through'])}")
+            raise build_missing_error(f"they let through: {', '.join(str(name)[:60] for name in report['through'])}")
         refusals = report["tried"] - len(report["through"])
         return f"{child.sandbox} (battery {report['version']}: {refusals} of {report['tried']} refused)"
 
@@ -246,7 +191,7 @@ class Zygote:
         answer = json.loads(data)
         if "missing" in answer:
             _close_descriptors(reading, writing)
-            raise _build_missing_error(answer["missing"])
+            raise build_missing_error(answer["missing"])
         self._living += 1
         inner_pid = answer["pid"]  # the id inside the zygote's namespace
         reap = functools.partial(self.reap, inner_pid)
@@ -268,12 +213,12 @@ class Zygote:
         except ChildStopped as stop:
             raise EOFError(stop.message) from None
         if active_layers["missing"] is not None:
-            raise _build_missing_error(active_layers["missing"])
+            raise build_missing_error(active_layers["missing"])
         if (
             bool(active_layers["landlock"]) != bool(self._sandbox.landlock)
             or active_layers["seccomp"] != self._sandbox.seccomp
         ):
-            raise _build_missing_error("a layer that was asked for does not stand")
+            raise build_missing_error("a layer that was asked for does not stand")
         self.without_doorkeeper = active_layers["without_doorkeeper"]
         child.sandbox = describe_layers(active_layers, self.without_bubblewrap is None, self._group is not None)
 
@@ -398,40 +343,4 @@ def _check_signal(pidfd: int) -> None:
     try:
         signal.pidfd_send_signal(pidfd, 0)
     except OSError as error:
-        raise _build_missing_error(f"pidfd_send_signal: {error.strerror}") from None
-
-
-def _build_missing_error(reason: str) -> SandboxMissing:
-    return SandboxMissing(
-        f"this machine cannot enclose student code: {reason}; "
-        "Robomark needs Linux 5.13 or later with Landlock and seccomp (in a container: Docker 23 or later)"
-    )
-
-
-def find_module_folder(role: ChildRole) -> str:
-    """Return the folder of our modules that the children of a role import."""
-    package, folder = _FOLDERS[role]
-    return str(_find_package_folder(package) / folder)
-
-
-@functools.cache
-def compile_bytecode(folder: Path) -> None:
-    """Compile these modules to bytecode on disk, because zygotes write none and would compile them every time."""
-    if sys.dont_write_bytecode:
-        return
-    for file in folder.rglob("*.py"):
-        bytecode_file = Path(importlib.util.cache_from_source(file))
-        if os.access(file.parent, os.W_OK) and not (
-            bytecode_file.exists() and bytecode_file.stat().st_mtime >= file.stat().st_mtime
-        ):
-            module_spec = importlib.machinery.PathFinder.find_spec(file.stem, [str(file.parent)])
-            assert module_spec is not None
-            assert isinstance(module_spec.loader, importlib.machinery.SourceFileLoader)
-            module_spec.loader.get_code(file.stem)
-
-
-def _find_package_folder(name: str) -> Path:
-    specification = importlib.util.find_spec(name)
-    assert specification is not None
-    assert specification.submodule_search_locations
-    return Path(specification.submodule_search_locations[0]).resolve()
+        raise build_missing_error(f"pidfd_send_signal: {error.strerror}") from None

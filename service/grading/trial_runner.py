@@ -22,7 +22,7 @@ from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.private_folders import remove_stale_folders
 from responders.sandbox.processor import one_processor
-from responders.sandbox.running_child import LibrariesNeeded
+from responders.sandbox.served_child import LibrariesNeeded
 from responders.training import Predictions, TrainingSpec, train_and_predict
 from responders.trial import run_trial
 from responders.trial_spec import ProgramSpec, ResponderSpec, TrialSpec

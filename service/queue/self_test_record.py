@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from responders.sandbox.zygote import ChildRole
+from responders.sandbox.roles import ChildRole
 from service.queue.processes import prepare_run_file
 from service.version import hash_grader
 

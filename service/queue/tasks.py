@@ -62,8 +62,8 @@ class _ChildHolder:
     @cached_property
     def child(self) -> PoolChild:
         from responders.sandbox import control_group
+        from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
         from responders.sandbox.manager import Sandboxes
-        from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
         from service.queue.self_test_record import SELF_TEST_ROLES, open_self_test_record
 
         settings = load_settings()

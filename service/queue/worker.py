@@ -17,8 +17,8 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from responders.sandbox import control_group
+from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import FULL_ISOLATION, NO_ISOLATION
 from service.home import keep_files_private, open_home
 from service.queue.celery_app import NO_SANDBOX, QUEUES, make_celery
 from service.queue.live_workers import (

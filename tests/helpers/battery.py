@@ -36,10 +36,12 @@ from responders import wire
 from responders.sandbox import manager
 from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.inside import lockdown
+from responders.sandbox.isolation import NO_ISOLATION, Isolation
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped
-from responders.sandbox.running_child import ChildLimits, LibrariesNeeded, ServedChild
-from responders.sandbox.zygote import NO_ISOLATION, ChildRole, Isolation
+from responders.sandbox.roles import ChildRole
+from responders.sandbox.running_child import ChildLimits
+from responders.sandbox.served_child import LibrariesNeeded, ServedChild
 from sim.recording import TICK, Verdict
 
 GROUPS = (files, file_changes, metadata, processes, signals, programs, network, kernel, memory)

@@ -10,8 +10,8 @@ import pytest
 import running
 from hostile import FIND_WIRE, flood, forged
 from responders.sandbox.meter import JobLimits, JobMeter
+from responders.sandbox.roles import ChildRole
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import ChildRole
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Recording, Verdict

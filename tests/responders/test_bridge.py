@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from responders.bridge import format_reading
 from responders.channel import Channel, TrialChannel
+from responders.sandbox.isolation import NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import NO_ISOLATION
+from responders.trial_world import format_reading
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import SECOND, Verdict

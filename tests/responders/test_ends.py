@@ -92,7 +92,7 @@ class _Killer:
 @pytest.fixture
 def plain_runner() -> Iterator[TrialRunner]:
     """Yield a runner without bubblewrap, which would change the child's process id."""
-    from responders.sandbox.zygote import Isolation
+    from responders.sandbox.isolation import Isolation
 
     with TrialRunner(Sandboxes(Isolation(bubblewrap=False))) as made:
         yield made

@@ -10,8 +10,8 @@ import responders.trial_spec
 from responders.function_calls import FunctionCall
 from responders.libraries_needed import build_notebook_source, may_need_libraries
 from responders.sandbox.inside.libraries import STANDARD_MODULES
+from responders.sandbox.roles import ChildRole
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import ChildRole
 from responders.source_file import SourceFile
 from responders.trial_spec import ResponderSpec
 from running import run_program

@@ -33,10 +33,11 @@ from battery import (
     run_together,
     unread,
 )
-from responders.sandbox import access_times, private_folders, zygote
+from responders.sandbox import access_times, private_folders, roles
 from responders.sandbox.access_times import read_beforehand
+from responders.sandbox.isolation import Isolation
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import ChildRole, Isolation
+from responders.sandbox.roles import ChildRole
 
 ATTACKS = attacks()
 MEMORIES = memories()
@@ -209,7 +210,7 @@ def tree(monkeypatch: pytest.MonkeyPatch, read: set[str]) -> Iterator[Path]:
 
     with tempfile.TemporaryDirectory() as made:
         folder = readable_tree(Path(made))
-        monkeypatch.setattr(zygote, "_find_package_folder", lambda name: folder / name)
+        monkeypatch.setattr(roles, "_find_package_folder", lambda name: folder / name)
         monkeypatch.setattr(access_times, "read_beforehand", read_the_rest)
         yield folder
 

@@ -17,8 +17,8 @@ import pytest
 from builders import echo
 from responders.sandbox import access_times
 from responders.sandbox.inside import grants
+from responders.sandbox.isolation import Isolation
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import Isolation
 from responders.source_file import SourceFile
 from service.doctor import examine_machine
 from service.grading.grader import grade

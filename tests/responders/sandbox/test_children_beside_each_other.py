@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import cast
 
 from responders.sandbox.control_group import ControlGroup
+from responders.sandbox.isolation import FULL_ISOLATION
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import FULL_ISOLATION
 
 
 class Noted:

@@ -14,8 +14,9 @@ from PIL import Image
 from sklearn.ensemble import RandomForestClassifier
 
 from battery import run_text
+from responders.sandbox.isolation import Isolation
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import ChildRole, Isolation
+from responders.sandbox.roles import ChildRole
 
 _DATA = """
 import numpy as np

@@ -14,8 +14,8 @@ import pytest
 from battery import SYSTEM_PYTHON, run_text
 from responders.sandbox import manager
 from responders.sandbox.inside import grants
+from responders.sandbox.isolation import NO_ISOLATION, Isolation
 from responders.sandbox.manager import Sandboxes
-from responders.sandbox.zygote import NO_ISOLATION, Isolation
 
 _SANDBOX = Path(manager.__file__).parent
 

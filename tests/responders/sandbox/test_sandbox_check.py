@@ -11,9 +11,9 @@ import pytest
 from battery import run_text
 from responders.sandbox import bubblewrap
 from responders.sandbox.inside.battery import ATTEMPTS
+from responders.sandbox.isolation import Isolation
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
-from responders.sandbox.zygote import Isolation
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 

@@ -18,7 +18,7 @@ import pytest
 from benchmarks.harness.process_tree import read_command_line
 from paths import HELPERS
 from processes import alive, until
-from responders.sandbox import zygote
+from responders.sandbox import roles
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import JobMeter
 from running import run_program
@@ -189,11 +189,11 @@ def test_what_children_import_is_compiled_once_and_kept(tmp_path: Path, monkeypa
     for source in sources:
         source.write_text("value = 1\n")
     kept = [Path(importlib.util.cache_from_source(source)) for source in sources]
-    zygote.compile_bytecode(tmp_path)
+    roles.compile_bytecode(tmp_path)
     before = [each.read_bytes() for each in kept]
     sources[0].write_text("value = 'another'\n")
     os.utime(kept[0], (1, 1))
-    zygote.compile_bytecode.cache_clear()
-    zygote.compile_bytecode(tmp_path)
+    roles.compile_bytecode.cache_clear()
+    roles.compile_bytecode(tmp_path)
     assert b"another" in kept[0].read_bytes()
     assert kept[1].read_bytes() == before[1]
