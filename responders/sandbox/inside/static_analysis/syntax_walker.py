@@ -1,4 +1,4 @@
-"""Walks through a syntax tree and records its contents: the place, reachability, and position in a loop.
+"""Walks through a syntax tree and adds its names and constructs to the contents of the file.
 
 It executes nothing and applies no rules. ``reader.py`` does.
 """
@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from .. import cell_source
+from .contents import CodeContents, Context
 from .lookups import list_name_arguments, may_unpickle
 from .node_properties import (
     collect_bound_names,
@@ -26,7 +27,7 @@ from .node_properties import (
     read_constant_text,
 )
 from .scopes import SymbolTable
-from .units import CodeUnit, Mention, SourcePlace
+from .units import CodeUnit
 from .vocabulary import (
     CONSTRUCTS,
     DOUBTFUL,
@@ -43,69 +44,38 @@ from .vocabulary import (
 )
 
 _MAX_TEXT_DEPTH = 8
-#: Maximum number of places kept per mention.
-_MAX_PLACES = 200
 
 
-class _Context(NamedTuple):
-    live: bool = True
-    looped: bool = False
-
-
-class SyntaxWalker:
-    """The contents of one file, or of the cells of one notebook."""
+class SyntaxWalker(CodeContents):
+    """Adds what it finds to the contents."""
 
     def __init__(self, doubt_about: Callable[[str], str]) -> None:
         """Start with no contents. ``doubt_about`` returns the doubt about importing a module as text, or ""."""
-        self.units: list[CodeUnit] = []
-        #: Files that a notebook writes: names and texts.
-        self.written: list[tuple[str, str]] = []
+        super().__init__()
         self._doubt_about = doubt_about
         self._naming = SymbolTable()
-        self._file = ""
-        self._unit = CodeUnit("")
         self._owner = ""
         self._understood: set[ast.AST] = set()  # doubtful nodes with visible arguments
         self._depth = 0
-        self._statement = (0, 0)  # start of the current statement
-        #: Names that the source defines itself.
-        self.made: set[str] = set()
 
     def read_tree(self, tree: ast.Module, file: str, unit: CodeUnit) -> None:
         """Add the contents of ``tree``. ``file`` is its name in messages."""
         self._begin_unit(file, unit)
-        self._naming.record_names(tree)
-        self.made |= collect_defined_names(tree)
-        self._walk_statements(tree.body, _Context())
+        self._record_names(tree)
+        self._walk_statements(tree.body, Context())
 
     def read_magic(self, magic: cell_source.CellMagic, file: str, unit: CodeUnit) -> None:
         """Add the contents of a cell magic."""
         self._begin_unit(file, unit)
-        self._visit_magic(magic.name, magic.line, magic.body, magic.number, _Context())
+        self._visit_magic(magic.name, magic.line, magic.body, magic.number, Context())
 
-    def _begin_unit(self, file: str, unit: CodeUnit) -> None:
-        self._file, self._unit = file, unit
-        self.units.append(unit)
-
-    def _add_mention(
-        self, kind: str, name: str, node: ast.AST, context: _Context, statement: tuple[int, int] | None = None
-    ) -> None:
-        """Add a mention. ``statement`` is the start of the statement that has to run for it, or the current one."""
-        if name:
-            place = SourcePlace(self._file, getattr(node, "lineno", 0), statement or self._statement)
-            places = self._unit.mentions.setdefault(Mention(kind, name, context.live, context.looped), [])
-            if len(places) < _MAX_PLACES:
-                places.append(place)
-
-    def _add_text_name(self, text: str, node: ast.AST, context: _Context) -> None:
-        self._add_mention("handed_on", text, node, context)
-        self._add_mention("name", text, node, context)
-        for part in sorted(DOUBTFUL.intersection(text.split("."))):
-            self._add_mention("any_name" if part in TABLES | RUNNERS | MAGICS else "doubt", part, node, context)
+    def _record_names(self, tree: ast.Module) -> None:
+        self._naming.record_names(tree)
+        self.made |= collect_defined_names(tree)
 
     # statements
 
-    def _walk_statements(self, body: Sequence[ast.stmt], context: _Context) -> None:
+    def _walk_statements(self, body: Sequence[ast.stmt], context: Context) -> None:
         outer_statement = self._statement
         for statement in body:
             self._statement = self._find_start(statement)
@@ -119,14 +89,14 @@ class SyntaxWalker:
         """Return the line and column of a statement; inside a text that is run, those of the statement that runs it."""
         return self._statement if self._depth else (statement.lineno, statement.col_offset)
 
-    def _walk_block(self, body: Sequence[ast.stmt], context: _Context, binding_nodes: Sequence[ast.AST] = ()) -> None:
+    def _walk_block(self, body: Sequence[ast.stmt], context: Context, binding_nodes: Sequence[ast.AST] = ()) -> None:
         """Walk through a block that may not run. ``binding_nodes`` are the nodes whose names it binds first."""
         with self._naming.block():
             if context.live:
                 self._naming.bind(collect_bound_names(binding_nodes))
             self._walk_statements(body, context)
 
-    def _visit(self, node: ast.AST, context: _Context) -> None:
+    def _visit(self, node: ast.AST, context: Context) -> None:
         construct = CONSTRUCTS.get(type(node))
         if construct is not None:
             # For a loop, its body has to run; for any other statement, the statement itself.
@@ -136,7 +106,7 @@ class SyntaxWalker:
             self._add_mention("construct", "else", node, context, self._find_start(node.orelse[0]))
         _VISITORS.get(type(node), SyntaxWalker._visit_parts)(self, node, context)
 
-    def _visit_parts(self, node: ast.AST, context: _Context) -> None:
+    def _visit_parts(self, node: ast.AST, context: Context) -> None:
         for _, value in ast.iter_fields(node):
             parts = value if isinstance(value, list) else [value]
             if parts and isinstance(parts[0], ast.stmt):
@@ -144,45 +114,45 @@ class SyntaxWalker:
             else:
                 self._visit_each((part for part in parts if isinstance(part, ast.AST)), context)
 
-    def _visit_each(self, nodes: Iterable[ast.AST | None], context: _Context) -> None:
+    def _visit_each(self, nodes: Iterable[ast.AST | None], context: Context) -> None:
         for node in nodes:
             if node is not None:
                 self._visit(node, context)
 
-    def _visit_if(self, node: ast.If, context: _Context) -> None:
+    def _visit_if(self, node: ast.If, context: Context) -> None:
         self._visit(node.test, context)
         for block, live in list_blocks(node):
             self._walk_block(block, context._replace(live=context.live and live))
 
-    def _visit_while(self, node: ast.While, context: _Context) -> None:
-        loop_context = _Context(context.live and evaluate_condition(node.test) is not False, True)
+    def _visit_while(self, node: ast.While, context: Context) -> None:
+        loop_context = Context(context.live and evaluate_condition(node.test) is not False, True)
         self._visit(node.test, loop_context)
         self._walk_block(node.body, loop_context)
         self._walk_block(node.orelse, context)
 
-    def _visit_for(self, node: ast.For | ast.AsyncFor, context: _Context) -> None:
+    def _visit_for(self, node: ast.For | ast.AsyncFor, context: Context) -> None:
         self._visit_each((node.iter, node.target), context)
-        self._walk_block(node.body, _Context(context.live and not is_empty_loop(node.iter), True), [node.target])
+        self._walk_block(node.body, Context(context.live and not is_empty_loop(node.iter), True), [node.target])
         self._walk_block(node.orelse, context)
 
-    def _visit_with(self, node: ast.With | ast.AsyncWith, context: _Context) -> None:
+    def _visit_with(self, node: ast.With | ast.AsyncWith, context: Context) -> None:
         self._visit_each(node.items, context)
         self._walk_block(node.body, context, node.items)
 
-    def _visit_handler(self, node: ast.ExceptHandler, context: _Context) -> None:
+    def _visit_handler(self, node: ast.ExceptHandler, context: Context) -> None:
         self._visit_each([node.type], context)
         self._walk_block(node.body, context, [ast.Name(node.name, ast.Store())] if node.name else [])
 
-    def _visit_case(self, node: ast.match_case, context: _Context) -> None:
+    def _visit_case(self, node: ast.match_case, context: Context) -> None:
         self._visit_each((node.pattern, node.guard), context)
         self._walk_block(node.body, context, [node.pattern])
 
-    def _visit_class_pattern(self, node: ast.MatchClass, context: _Context) -> None:
+    def _visit_class_pattern(self, node: ast.MatchClass, context: Context) -> None:
         for attribute in node.kwd_attrs:
             self._add_text_name(attribute, node, context)
         self._visit_parts(node, context)
 
-    def _visit_function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, context: _Context) -> None:
+    def _visit_function(self, node: ast.FunctionDef | ast.AsyncFunctionDef, context: Context) -> None:
         self._add_mention("function", node.name, node, context)
         if node.name in DOUBTFUL and node.name.startswith("__"):
             self._add_mention("doubt", node.name, node, context)
@@ -195,15 +165,15 @@ class SyntaxWalker:
         self._unit, self._owner = function_unit, ""
         bound_names = collect_parameters(node) | collect_bound_names(node.body) - collect_outer_names(node)
         with self._naming.scope("function", bound_names):
-            self._walk_statements(node.body, _Context())
+            self._walk_statements(node.body, Context())
         self._unit, self._owner = outer_unit
 
-    def _visit_lambda(self, node: ast.Lambda, context: _Context) -> None:
+    def _visit_lambda(self, node: ast.Lambda, context: Context) -> None:
         self._visit(node.args, context)
         with self._naming.scope("function", collect_parameters(node)):
             self._visit(node.body, context)
 
-    def _visit_class(self, node: ast.ClassDef, context: _Context) -> None:
+    def _visit_class(self, node: ast.ClassDef, context: Context) -> None:
         self._visit_each([*node.decorator_list, *node.bases, *node.keywords], context)
         owner, self._owner = self._owner, node.name
         with self._naming.scope("class"):
@@ -212,32 +182,32 @@ class SyntaxWalker:
 
     # expressions
 
-    def _visit_comprehension(self, node: Any, context: _Context) -> None:
+    def _visit_comprehension(self, node: Any, context: Context) -> None:
         first_generator, *other_generators = node.generators
         self._visit(first_generator.iter, context)
-        loop_context = _Context(context.live and not is_empty_loop(first_generator.iter), True)
+        loop_context = Context(context.live and not is_empty_loop(first_generator.iter), True)
         with self._naming.scope("comprehension", collect_bound_names([each.target for each in node.generators])):
             self._visit_each([first_generator.target, *first_generator.ifs, *other_generators], loop_context)
             self._visit_each([getattr(node, name, None) for name in ("elt", "key", "value")], loop_context)
 
-    def _visit_conditional(self, node: ast.IfExp, context: _Context) -> None:
+    def _visit_conditional(self, node: ast.IfExp, context: Context) -> None:
         condition = evaluate_condition(node.test)
         self._visit(node.test, context)
         self._visit(node.body, context._replace(live=context.live and condition is not False))
         self._visit(node.orelse, context._replace(live=context.live and condition is not True))
 
-    def _visit_walrus(self, node: ast.NamedExpr, context: _Context) -> None:
+    def _visit_walrus(self, node: ast.NamedExpr, context: Context) -> None:
         self._visit_each((node.value, node.target), context)
         if context.live:
             self._naming.bind({node.target.id}, is_sure=False)
 
-    def _visit_bool_op(self, node: ast.BoolOp, context: _Context) -> None:
+    def _visit_bool_op(self, node: ast.BoolOp, context: Context) -> None:
         deciding_value = isinstance(node.op, ast.Or)
         for value in node.values:
             self._visit(value, context)
             context = context._replace(live=context.live and evaluate_condition(value) is not deciding_value)
 
-    def _visit_chain(self, node: ast.Name | ast.Attribute, context: _Context, kind: str = "handed_on") -> None:
+    def _visit_chain(self, node: ast.Name | ast.Attribute, context: Context, kind: str = "handed_on") -> None:
         """Add a name or a dotted name. ``kind`` says how it is used."""
         names = self._naming.resolve_names(node)
         is_own = self._naming.is_own(node.id) if isinstance(node, ast.Name) else False
@@ -256,18 +226,18 @@ class SyntaxWalker:
         if is_own is not True and node not in self._understood:
             self._doubt_chain(names, node, context)
 
-    def _doubt_name_taker(self, names: list[str], node: ast.AST, context: _Context) -> None:
+    def _doubt_name_taker(self, names: list[str], node: ast.AST, context: Context) -> None:
         """Add doubt for a function such as ``getattr`` passed on (``map(getattr, ...)``): it may look up any name."""
         for function_name in {name.rpartition(".")[2] for name in names} & NAME_TAKERS:
             self._add_mention("any_name", function_name, node, context)
 
-    def _visit_base(self, node: ast.expr, context: _Context) -> None:
+    def _visit_base(self, node: ast.expr, context: Context) -> None:
         if isinstance(node, ast.Name | ast.Attribute):
             self._visit_chain(node, context, "base")
         else:
             self._visit(node, context)
 
-    def _doubt_chain(self, names: list[str], node: ast.AST, context: _Context) -> None:
+    def _doubt_chain(self, names: list[str], node: ast.AST, context: Context) -> None:
         doubtful_names = DOUBTFUL_ALONE if isinstance(node, ast.Name) else DOUBTFUL_METHODS
         last_parts = [name.rpartition(".")[2] for name in names]
         doubtful = next(
@@ -280,11 +250,11 @@ class SyntaxWalker:
         elif self._naming.may_be_imported(node):
             self._add_mention("doubt", next(filter(is_doubtful_import, names), ""), node, context)
 
-    def _visit_subscript(self, node: ast.Subscript, context: _Context) -> None:
+    def _visit_subscript(self, node: ast.Subscript, context: Context) -> None:
         self._add_table_lookup(node.value, node.slice, node, context)
         self._visit_parts(node, context)
 
-    def _add_table_lookup(self, table: ast.expr, key: ast.expr, node: ast.AST, context: _Context) -> None:
+    def _add_table_lookup(self, table: ast.expr, key: ast.expr, node: ast.AST, context: Context) -> None:
         """Add the name looked up in a table (``globals()["say"]``), if the text shows both."""
         table_node = table.func if isinstance(table, ast.Call) else table
         names = self._naming.resolve_names(table_node)
@@ -299,7 +269,7 @@ class SyntaxWalker:
             return
         self._understood.add(table_node)
 
-    def _visit_call(self, node: ast.Call, context: _Context) -> None:
+    def _visit_call(self, node: ast.Call, context: Context) -> None:
         function = node.func
         calls = {name.rpartition(".")[2] for name in self._naming.resolve_names(function)}
         texts = [read_constant_text(argument) for argument in node.args]
@@ -334,7 +304,7 @@ class SyntaxWalker:
             self._visit(function, context)
         self._visit_each([*node.args, *node.keywords], context)
 
-    def _add_looked_up_names(self, node: ast.Call, calls: set[str], context: _Context) -> None:
+    def _add_looked_up_names(self, node: ast.Call, calls: set[str], context: Context) -> None:
         """Add the names that a call looks up (``series.agg("mean")``), or doubt if they are unknown."""
         if (
             isinstance(node.func, ast.Name)
@@ -352,19 +322,13 @@ class SyntaxWalker:
         if "transform" in calls and node.args and self._naming.is_text(node.args[0]):
             self._add_name_or_doubt("transform", read_constant_text(node.args[0]), node, context)
 
-    def _add_name_or_doubt(self, call: str, text: str | None, node: ast.AST, context: _Context) -> None:
-        if text is None:
-            self._add_mention("any_name", call, node, context)
-        else:
-            self._add_text_name(text, node, context)
-
     # imports
 
-    def _visit_import(self, node: ast.Import, context: _Context) -> None:
+    def _visit_import(self, node: ast.Import, context: Context) -> None:
         for alias in node.names:
             self._add_import(alias.name, node, context)
 
-    def _visit_import_from(self, node: ast.ImportFrom, context: _Context) -> None:
+    def _visit_import_from(self, node: ast.ImportFrom, context: Context) -> None:
         self._add_import(node.module or "", node, context)
         for alias in node.names:
             full_name = f"{node.module or ''}.{alias.name}"
@@ -375,13 +339,13 @@ class SyntaxWalker:
             if alias.asname not in (None, alias.name):
                 self._add_mention("handed_on", alias.name, node, context)
 
-    def _add_import(self, module: str, node: ast.AST, context: _Context) -> None:
+    def _add_import(self, module: str, node: ast.AST, context: Context) -> None:
         self._add_mention("import", module, node, context)
         self._add_mention("doubt", self._doubt_about(module), node, context)
 
     # texts that are run
 
-    def _walk_text(self, source: str | bytes, line: int, context: _Context) -> bool:
+    def _walk_text(self, source: str | bytes, line: int, context: Context) -> bool:
         """Walk through a text that is run as Python, at its place. Return whether it could be parsed."""
         if self._depth >= _MAX_TEXT_DEPTH:
             return False
@@ -390,14 +354,13 @@ class SyntaxWalker:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             return False
         ast.increment_lineno(tree, line - 1)
-        self._naming.record_names(tree)
-        self.made |= collect_defined_names(tree)
+        self._record_names(tree)
         self._depth += 1
         self._walk_block(tree.body, context)
         self._depth -= 1
         return True
 
-    def _visit_magic_call(self, call: str, texts: list[str | None], node: ast.Call, context: _Context) -> None:
+    def _visit_magic_call(self, call: str, texts: list[str | None], node: ast.Call, context: Context) -> None:
         known_texts = [text for text in texts if text is not None]
         if not texts or len(known_texts) < len(texts) or node.keywords:
             self._add_mention("any_name", call, node, context)
@@ -408,7 +371,7 @@ class SyntaxWalker:
         name, line, body = (*known_texts, "", "")[:3]
         self._visit_magic(name.lstrip("%"), line, body if call == "run_cell_magic" else None, node.lineno, context)
 
-    def _visit_magic(self, name: str, line: str, body: str | None, number: int, context: _Context) -> None:
+    def _visit_magic(self, name: str, line: str, body: str | None, number: int, context: Context) -> None:
         """Walk through the code that a magic runs: expressions in its line; for some magics the line or the cell."""
         position_node = ast.Pass(lineno=number)
         expressions = list(cell_source.list_expressions(line))
@@ -442,7 +405,7 @@ def _remove_indent(source: str | bytes, calls: set[str]) -> str | bytes:
     return source.lstrip(" \t") if isinstance(source, str) else source.lstrip(b" \t")
 
 
-_VISITORS: Mapping[type[ast.AST], Callable[[SyntaxWalker, Any, _Context], None]] = {
+_VISITORS: Mapping[type[ast.AST], Callable[[SyntaxWalker, Any, Context], None]] = {
     ast.If: SyntaxWalker._visit_if,
     ast.While: SyntaxWalker._visit_while,
     ast.For: SyntaxWalker._visit_for,
