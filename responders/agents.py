@@ -12,12 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 from responders import wire
 from responders.faults import build_error_fault, to_child_data_error
 from responders.logger_file import read_log
-from responders.responder_process import ResponderProcess
+from responders.responder_process import AgentReply, ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.trial_spec import AgentSpec
@@ -31,15 +31,6 @@ _MAX_QUESTIONS = 10_000
 _MAX_NOTES = 200
 _MAX_TYPE_LENGTH = 100
 _INVALID_JSON = object()
-
-
-@dataclass(frozen=True, slots=True)
-class AgentReply:
-    """Reply to a question: a JSON value or an error message to raise in the asker, and how long the agent slept."""
-
-    kind: Literal["value", "error"]
-    text: str
-    slept: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,10 @@ It handles one message at a time. ``conversation.py`` decides which texts arrive
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, Protocol
 
 from responders import message_format, wire
 from responders.conversation import Answer
@@ -20,13 +21,10 @@ from responders.faults import (
 )
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
-from responders.sandbox.running_child import ServedChild
+from responders.sandbox.served_child import ServedChild
 from responders.trial_spec import ResponderSpec
 from sim.random_streams import RandomStream
-from sim.recording import SECOND, Call, Fault, Verdict
-
-if TYPE_CHECKING:
-    from responders.agents import Agents
+from sim.recording import SECOND, AgentMessage, Call, Fault, Verdict
 
 _MAX_NOTES = 200
 #: Maximum number of recorded calls, and of characters in each of their parts.
@@ -46,6 +44,27 @@ class LoggedData:
     images: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class AgentReply:
+    """Reply to a question: a JSON value or an error message to raise in the asker, and how long the agent slept."""
+
+    kind: Literal["value", "error"]
+    text: str
+    slept: int = 0
+
+
+class AskableAgents(Protocol):
+    """The agents of a trial, as a responder sees them (``agents.py``)."""
+
+    messages: list[AgentMessage]
+
+    def list_askable_agents(self, asker: str) -> Sequence[str]:
+        """Return the names of the agents that ``asker`` may ask."""
+
+    def ask(self, asker: str, question: wire.Frame, t: int, message: int) -> AgentReply:
+        """Return the reply to a question."""
+
+
 class ResponderProcess:
     """The process of a responder during one trial. ``answer`` raises no exception for errors in student code."""
 
@@ -59,7 +78,7 @@ class ResponderProcess:
         folder: Path,
         seed: int,
         meter: JobMeter,
-        agents: Agents | None = None,
+        agents: AskableAgents | None = None,
     ) -> None:
         """Start the process. ``agents`` are the agents that it may ask."""
         self._spec = spec
