@@ -15,8 +15,11 @@ from sqlalchemy.orm import Session
 from benchmarks.graded_store import GradedBatch
 from service.store.columns import UtcDateTime
 from service.store.engine import Store
-from service.store.models import Base, Batch, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.states import JobState
+from service.store.tables.base import Base
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.people import Enrolment, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 
 STUDENTS = 2000
 BATCHES = 50

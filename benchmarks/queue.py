@@ -24,9 +24,9 @@ from service.settings import load_settings
 from service.store.batches import batches, intake, job_lines
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
-from service.store.models import Job
 from service.store.queue.metrics import compute_quantile
 from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job
 
 _BATCH = 200
 _DEEP = 500

@@ -20,8 +20,8 @@ from service.queue.supervised_processes import SupervisedWorker
 from service.settings import load_settings
 from service.store.batches import intake
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.states import JobQueue
+from service.store.tables.submissions import Job
 
 _PATIENCE = 120.0
 _LOOK_SECONDS = 0.02

@@ -20,8 +20,8 @@ from benchmarks.measurement import MILLISECONDS, Measurement, measure_wall_secon
 from service.settings import load_settings
 from service.store.batches import batches, job_lines
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.queue import jobs
+from service.store.tables.submissions import Job
 
 _PLANS = Path(__file__).parents[1] / "docs" / "query-plans.txt"
 _TIMES = 9

@@ -14,8 +14,8 @@ from service.queue.notifier import Notifier
 from service.settings import load_settings
 from service.store.batches import intake
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.states import JobQueue, JobState, PlotState
+from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission

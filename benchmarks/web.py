@@ -27,11 +27,11 @@ from service.settings import load_settings
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.people import credentials, membership
 from service.store.people.students import DEFAULT_COURSE
 from service.store.queue.metrics import compute_quantile
 from service.store.states import CredentialKind, JobState
+from service.store.tables.submissions import Job
 from service.web.access import CSRF_HEADER, SESSION_COOKIE, derive_csrf_token
 from service.web.listening_sockets import listen
 from submissions.assignment.reader import find_assignment

@@ -32,11 +32,11 @@ from service.queue.live_workers import is_worker_running
 from service.settings import Settings
 from service.store.engine import Store, now, open_engine
 from service.store.installation import load_secret
-from service.store.models import Job
 from service.store.queue import workers
 from service.store.queue.metrics import collect_queue_metrics
 from service.store.revision import find_newest_revision, load_schema_state
 from service.store.states import JobState
+from service.store.tables.submissions import Job
 from service.version import GRADER_VERSION, describe_release_problem
 from sim.errors import RobomarkError
 from submissions.seeds import format_secret_name

@@ -22,9 +22,11 @@ from service.reports.view import View, build_student_view
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import current_grades, results
-from service.store.models import AssignmentVersion, Batch, Course, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.people import membership
-from service.store.web_tables import Appeal, Credential, Tryout
+from service.store.tables.courses import AssignmentVersion, Course, Extension
+from service.store.tables.grades import Appeal
+from service.store.tables.people import Credential, Enrolment, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow, Tryout
 from submissions.student_names import normalise_name
 
 #: Number of submissions fetched at once.

@@ -39,8 +39,10 @@ from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.batches.stored_requests import load_grading_request
 from service.store.engine import Store
-from service.store.models import CriterionResultRow, Heartbeat, Job, TrialRow
 from service.store.states import UNFINISHED, JobQueue, JobState
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.installation import Heartbeat
+from service.store.tables.submissions import Job
 from sim.errors import HostError
 from sim.processes import build_python_command
 from submissions.assignment.reader import find_assignment

@@ -8,9 +8,11 @@ from sqlalchemy.orm import Session
 from service.lti.services import Score, send_scores
 from service.store.engine import Store, now
 from service.store.grades import current_grades
-from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.people import lti
 from service.store.people.lti import CourseLink
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
 

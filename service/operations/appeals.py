@@ -13,8 +13,8 @@ from service.store.courses import open_assignments
 from service.store.engine import retry_conflicts
 from service.store.grades import appeals
 from service.store.grades.appeals import MAX_TEXT_LENGTH, AppealLine
-from service.store.models import SubmissionRow
 from service.store.states import Role
+from service.store.tables.submissions import SubmissionRow
 
 __all__ = ["MAX_TEXT_LENGTH"]
 

@@ -14,8 +14,8 @@ from service.operations.errors import Conflict
 from service.operations.lookup import require_course, require_own_enrolment
 from service.store.batches import intake
 from service.store.courses import open_assignments
-from service.store.models import Course
 from service.store.states import JobQueue, Role
+from service.store.tables.courses import Course
 from sim.errors import UsageError
 from submissions.archive_extraction import unzip
 from submissions.assignment.definition import Assignment

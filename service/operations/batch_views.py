@@ -43,11 +43,11 @@ from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import format_days as format_days
 from service.store.grades import current_grades
 from service.store.grades.statistics_marks import load_marked_submissions
-from service.store.models import Batch
 from service.store.queue import metrics, workers
 from service.store.queue.metrics import Pace
 from service.store.queue.workers import WorkerDescription as WorkerDescription
 from service.store.states import BatchState, Role
+from service.store.tables.submissions import Batch
 
 if TYPE_CHECKING:
     from service.operations.batches import SubmittedBatch

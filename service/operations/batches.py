@@ -29,13 +29,15 @@ from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now, retry_conflicts
 from service.store.installation import load_secret
-from service.store.models import Course, Enrolment, Job
 from service.store.people import membership
 from service.store.people.students import DEFAULT_COURSE, ensure_course
 from service.store.queue import batch_control
 from service.store.queue.batch_control import BatchControlResult as BatchControlResult
 from service.store.queue.batch_control import RetryCounts as RetryCounts
 from service.store.states import JobQueue, Role
+from service.store.tables.courses import Course
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 from submissions.student_identity import RejectedSubmission
 

@@ -14,13 +14,13 @@ from service.operations.sign_in_links import make_link
 from service.store import audit
 from service.store.engine import now
 from service.store.grades import appeals
-from service.store.models import Course
 from service.store.people import membership
 from service.store.people.membership import CourseLine as CourseLine
 from service.store.people.membership import Member
 from service.store.people.students import DEFAULT_COURSE as DEFAULT_COURSE
 from service.store.people.students import ensure_course
 from service.store.states import Role
+from service.store.tables.courses import Course
 from submissions.student_identity import Student
 
 #: Longest name of a course.

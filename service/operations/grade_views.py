@@ -24,8 +24,8 @@ from service.store.batches.regrades import Change, GradingLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
 from service.store.grades.own_gradings import OwnGrading
-from service.store.models import Job
 from service.store.states import CancelReason, JobState, Role
+from service.store.tables.submissions import Job
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,9 @@ from service.store.grades import comments, marking_history, overrides
 from service.store.grades.comments import MAX_COMMENT_LENGTH, CommentLine
 from service.store.grades.marking_history import MarkingStep
 from service.store.grades.overrides import MAX_REASON_LENGTH, CriterionMarks
-from service.store.models import AssignmentVersion, Job
 from service.store.states import JobState, Role
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.submissions import Job
 
 __all__ = ["MAX_COMMENT_LENGTH", "MAX_REASON_LENGTH"]
 

@@ -12,9 +12,10 @@ from service.operations.context import Actor, Service
 from service.operations.errors import Forbidden, Invalid, NotFound
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames, load_hidden_names
 from service.store.courses.open_assignments import match_anonymous_assignments
-from service.store.models import Batch, Course, Enrolment, Job, SubmissionRow
 from service.store.states import Role
-from service.store.web_tables import OpenAssignment
+from service.store.tables.courses import Course, OpenAssignment
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 
 
 def check_operator(actor: Actor) -> None:

@@ -22,8 +22,9 @@ from service.store.courses.policies import ExceededLimit, OverLimit, PolicyLimit
 from service.store.engine import now
 from service.store.grades import appeals, current_grades, results
 from service.store.grades.appeals import AppealLine
-from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 
 #: Per student and assignment; only the newest submissions are shown.
 MAX_LISTED_SUBMISSIONS = 50

@@ -15,7 +15,6 @@ from service.operations.lookup import check_no_names_hidden, check_operator, req
 from service.store import audit
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
-from service.store.models import Enrolment, Person
 from service.store.people import credentials, membership
 from service.store.people.credentials import CredentialLine
 from service.store.people.membership import Member as Member
@@ -23,6 +22,7 @@ from service.store.people.reach import Reach
 from service.store.people.students import Students
 from service.store.purge import remove_student
 from service.store.states import CredentialKind, Role
+from service.store.tables.people import Enrolment, Person
 from sim.sentences import Sentence
 from submissions.student_identity import Student
 

@@ -13,7 +13,7 @@ from sqlalchemy import delete, select, update
 from service.operations.context import Actor, Service
 from service.store.conditional_insert import insert_if_new
 from service.store.engine import now, retry_conflicts
-from service.store.web_tables import IdempotentReply
+from service.store.tables.installation import IdempotentReply
 
 #: Time for which a key identifies the same request.
 RETENTION = timedelta(hours=24)

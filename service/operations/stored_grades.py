@@ -70,7 +70,7 @@ def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
     from service.store.batches import stored_requests
     from service.store.grades import results
     from service.store.installation import load_secret
-    from service.store.models import Job
+    from service.store.tables.submissions import Job
 
     check_operator(actor)
     own_secret = load_secret(service.store)

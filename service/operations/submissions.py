@@ -15,8 +15,8 @@ from service.store.batches import intake
 from service.store.batches.intake import AcceptedSubmission
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
-from service.store.models import Course
 from service.store.states import JobQueue, Role
+from service.store.tables.courses import Course
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.bundle import build_submission

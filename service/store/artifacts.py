@@ -15,7 +15,8 @@ from itertools import groupby
 from sqlalchemy import and_, delete, select
 from sqlalchemy.orm import Session
 
-from service.store.models import Artifact, Job
+from service.store.tables.grades import Artifact
+from service.store.tables.submissions import Job
 from sim.errors import HostError
 
 CAP_BYTES = 64_000_000

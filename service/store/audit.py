@@ -12,7 +12,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.models import Audit
+from service.store.tables.installation import Audit
 
 
 @dataclass(frozen=True, slots=True)

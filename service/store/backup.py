@@ -19,9 +19,11 @@ from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
 from service.store.migrate import upgrade_database
-from service.store.models import Course, Installation, Job, SchemaCompatibility
 from service.store.revision import find_newest_revision, load_current_revision
-from service.store.web_tables import METADATA
+from service.store.tables import METADATA
+from service.store.tables.courses import Course
+from service.store.tables.installation import Installation, SchemaCompatibility
+from service.store.tables.submissions import Job
 from sim.errors import HostError, UsageError
 
 #: Small, because some rows contain a recording.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sqlalchemy.orm import Session
 
-from service.store import models
+from service.store.tables.base import Base
 
 
-def insert_if_new(session: Session, table: type[models.Base], **values: object) -> bool:
+def insert_if_new(session: Session, table: type[Base], **values: object) -> bool:
     """Insert a row unless one with the same unique values exists. Return whether it was inserted."""
     # Only one dialect is imported: each takes longer than the rest of a simple command.
     if session.get_bind().dialect.name == "postgresql":

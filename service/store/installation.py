@@ -8,7 +8,7 @@ from __future__ import annotations
 from sqlalchemy import select
 
 from service.store.engine import Store
-from service.store.models import Installation
+from service.store.tables.installation import Installation
 from sim.errors import HostError
 from submissions.seeds import Secret
 

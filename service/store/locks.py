@@ -9,7 +9,10 @@ from __future__ import annotations
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from service.store.models import Course, Installation, Job, Person, SubmissionRow
+from service.store.tables.courses import Course
+from service.store.tables.installation import Installation
+from service.store.tables.people import Person
+from service.store.tables.submissions import Job, SubmissionRow
 
 
 def lock_installation(session: Session) -> None:

@@ -25,7 +25,7 @@ def is_empty_sqlite(connection: Connection) -> bool:
 def create_tables(connection: Connection, revision: str) -> None:
     """Create the tables of ``revision``, which is the newest, and the rows that the migrations insert."""
     # Imported only for a new database: read-only commands do not need the tables.
-    from service.store.models import Installation
+    from service.store.tables.installation import Installation
 
     for statement in SCHEMA_FILE.read_text(encoding="utf-8").split(STATEMENT_SEPARATOR):
         connection.exec_driver_sql(statement)

@@ -17,9 +17,10 @@ from sqlalchemy import ColumnElement, Select, and_, delete, func, or_, select, u
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
-from service.store.models import Batch, Enrolment, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState
-from service.store.web_tables import Delivery, OpenAssignment, Webhook
+from service.store.tables.courses import Delivery, OpenAssignment, Webhook
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 
 #: Time after which a delivery is given up.
 RETRY_PERIOD = timedelta(days=1)

@@ -16,18 +16,12 @@ from sqlalchemy.orm import Session, aliased
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
 from service.store.locks import lock_jobs, lock_submissions
-from service.store.models import AssignmentVersion, Audit, Batch, Enrolment, Extension, Job, Person, SubmissionRow
 from service.store.states import UNFINISHED, JobState, Role
-from service.store.web_tables import (
-    Appeal,
-    Comment,
-    Credential,
-    IdempotentReply,
-    LtiPerson,
-    OpenAssignment,
-    Override,
-    Tryout,
-)
+from service.store.tables.courses import AssignmentVersion, Extension, OpenAssignment
+from service.store.tables.grades import Appeal, Comment, Override
+from service.store.tables.installation import Audit, IdempotentReply
+from service.store.tables.people import Credential, Enrolment, LtiPerson, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow, Tryout
 from sim.errors import UsageError
 from submissions.student_names import normalise_name
 

@@ -12,8 +12,8 @@ from sqlalchemy.engine import Connection
 
 from service.store.engine import open_engine
 from service.store.migrate import apply_migrations
-from service.store.models import SchemaCompatibility
 from service.store.new_database import SCHEMA_FILE, STATEMENT_SEPARATOR
+from service.store.tables.installation import SchemaCompatibility
 
 
 def read_statements(connection: Connection) -> list[str]:

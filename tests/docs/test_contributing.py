@@ -66,7 +66,9 @@ from sqlalchemy import select
 from service.command_line import load_command
 from service.settings import Settings
 from service.store.engine import now, open_store
-from service.store.models import Audit, Batch, Course
+from service.store.tables.installation import Audit
+from service.store.tables.submissions import Batch
+from service.store.tables.courses import Course
 from service.web.app import make_app
 home = Path(tempfile.mkdtemp()) / "home"
 os.environ["ROBOMARK_HOME"] = str(home)
@@ -91,7 +93,7 @@ from service.settings import Settings
 from service.store import recorded_schema
 from service.store.engine import open_engine, open_store
 from service.store.migrate import build_alembic_config, apply_migrations
-from service.store.web_tables import METADATA
+from service.store.tables import METADATA
 assert "batch_note" in METADATA.tables
 recorded_schema.write_schema()
 engine = open_engine(f"sqlite:///{tempfile.mkdtemp()}/new.db")

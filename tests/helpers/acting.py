@@ -12,8 +12,9 @@ from service.operations.context import Actor, Service
 from service.operations.exports import Download, ExportRequest
 from service.operations.regrades import PublicationCounts, RegradeBatch
 from service.store.engine import Store
-from service.store.models import Batch, Enrolment, Job
 from service.store.states import JobQueue
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 from submissions.assignment.definition import Assignment
 
 

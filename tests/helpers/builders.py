@@ -21,8 +21,8 @@ from service.store.batches.intake import AcceptedSubmission, accept_submission
 from service.store.engine import Store, open_store
 from service.store.grades import recordings
 from service.store.installation import load_secret
-from service.store.models import SchemaCompatibility
 from service.store.states import JobQueue
+from service.store.tables.installation import SchemaCompatibility
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment

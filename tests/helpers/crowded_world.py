@@ -11,33 +11,13 @@ from sqlalchemy import ColumnElement, insert, inspect, select
 from sqlalchemy.orm import Session
 
 from service.store.ids import generate_id
-from service.store.models import (
-    Artifact,
-    AssignmentVersion,
-    Base,
-    Batch,
-    Course,
-    CriterionResultRow,
-    Enrolment,
-    Extension,
-    Heartbeat,
-    Job,
-    Person,
-    Policy,
-    SubmissionRow,
-    TrialRow,
-)
 from service.store.states import CredentialKind, JobState, Role, Standing
-from service.store.web_tables import (
-    Appeal,
-    Comment,
-    Credential,
-    Delivery,
-    LtiPlatform,
-    OpenAssignment,
-    Override,
-    Webhook,
-)
+from service.store.tables.base import Base
+from service.store.tables.courses import AssignmentVersion, Course, Delivery, Extension, OpenAssignment, Policy, Webhook
+from service.store.tables.grades import Appeal, Artifact, Comment, CriterionResultRow, Override, TrialRow
+from service.store.tables.installation import Heartbeat
+from service.store.tables.people import Credential, Enrolment, LtiPlatform, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from web import Web
 from web_world import World
 

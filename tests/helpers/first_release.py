@@ -16,7 +16,7 @@ from paths import DATA
 from service.store.columns import SafeText
 from service.store.engine import open_engine
 from service.store.migrate import build_alembic_config
-from service.store.web_tables import METADATA
+from service.store.tables import METADATA
 
 #: The file and the revision of each database.
 _FIRST, _SECOND = ("first_release.sql", "0002"), ("release_0_2_0.sql", "0008")

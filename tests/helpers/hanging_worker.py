@@ -13,9 +13,10 @@ from service.queue import celery_app
 from service.queue.worker import run_worker
 from service.settings import load_settings
 from service.store.engine import Store
-from service.store.models import Enrolment, Job
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job
 
 HANGS = "hangs"
 _finish_from_cache = jobs.finish_job_from_cache

@@ -20,12 +20,13 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import appeals, comments, overrides, results
-from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import webhooks
 from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.queue import jobs
 from service.store.states import JobState
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 from submissions.grading_request import GradingRequest
 from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web

@@ -19,11 +19,12 @@ from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
 from service.store.grades import plots, results
-from service.store.models import Batch, Job, SchemaCompatibility
 from service.store.queue import jobs, metrics, test_runs, workers
 from service.store.queue.workers import WorkerDescription
 from service.store.revision import SchemaState, find_newest_revision
 from service.store.states import BatchState
+from service.store.tables.installation import SchemaCompatibility
+from service.store.tables.submissions import Batch, Job
 from service.version import GRADER_VERSION
 
 

@@ -17,9 +17,10 @@ from command import robomark
 from service.reports.output_files import build_file_stem, build_file_stems, build_refused_stems
 from service.store.batches import intake
 from service.store.engine import Store, now
-from service.store.models import Enrolment, Job, Person, SubmissionRow
 from service.store.people.students import Students, ensure_course
 from service.store.states import Role
+from service.store.tables.people import Enrolment, Person
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.bundle import read_submission

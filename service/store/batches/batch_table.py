@@ -18,8 +18,11 @@ from sqlalchemy.orm import Session
 from service.store.batches.job_lines import match_standing_jobs
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import current_grades, overrides
-from service.store.models import AssignmentVersion, Batch, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.states import CancelReason, JobState
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from submissions.student_identity import RejectedSubmission
 
 REFUSED = "refused"

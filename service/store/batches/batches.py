@@ -15,9 +15,9 @@ from sqlalchemy.orm import InstrumentedAttribute, Session, aliased
 
 from service.store.codec import decode
 from service.store.grades import current_grades
-from service.store.models import Batch, Job, SubmissionRow
 from service.store.states import UNFINISHED, BatchState, JobState, PlotState, Standing
-from service.store.web_tables import OpenAssignment
+from service.store.tables.courses import OpenAssignment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import UsageError
 from submissions.student_identity import RejectedSubmission
 from submissions.suggestions import suggest_name

@@ -18,8 +18,9 @@ from service.store.batches.batch_table import REFUSED, TableLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import current_grades
 from service.store.grades.statistics_marks import load_marked_submissions
-from service.store.models import Enrolment, SubmissionRow
 from service.store.states import Role
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import SubmissionRow
 from submissions.student_identity import Student
 
 

@@ -25,11 +25,11 @@ from service.store.grades import result_cache
 from service.store.ids import generate_id
 from service.store.installation import load_secret
 from service.store.locks import lock_jobs
-from service.store.models import Batch, Job, SubmissionRow
 from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.queue import jobs
 from service.store.states import CancelReason, JobQueue, JobState
-from service.store.web_tables import Comment
+from service.store.tables.grades import Comment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from service.version import hash_grader
 from sim.errors import UsageError
 from submissions.grading_request import GradingRequest

@@ -17,9 +17,11 @@ from sqlalchemy.orm import Session
 from service.store.batches.batches import is_regrade, select_shown_submissions
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames
 from service.store.grades import current_grades, overrides
-from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.states import UNFINISHED, CancelReason, JobState, PlotState, Role, Standing
-from service.store.web_tables import Override
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import CriterionResultRow, Override, TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
 #: Columns read for each job.

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
-from service.store.models import AssignmentVersion, Batch, Job, SubmissionRow
 from service.store.states import BatchState, JobState, Standing
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from service.version import hash_grader
 from submissions.grading_request import GradingRequest
 

@@ -15,8 +15,9 @@ from sqlalchemy.orm import Session
 from service.store.engine import now
 from service.store.grades import current_grades, overrides
 from service.store.locks import lock_jobs, lock_submissions
-from service.store.models import CriterionResultRow, Job, SubmissionRow
 from service.store.states import UNFINISHED, JobState, Standing
+from service.store.tables.grades import CriterionResultRow
+from service.store.tables.submissions import Job, SubmissionRow
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,9 @@ from service.store.batches.job_lines import JobLine
 from service.store.codec import decode
 from service.store.courses.assignment_versions import assignment_from_bytes
 from service.store.grades import current_grades, overrides
-from service.store.models import AssignmentVersion, CriterionResultRow, Job
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import CriterionResultRow
+from service.store.tables.submissions import Job
 
 if TYPE_CHECKING:
     from submissions.criteria.timing import Ranking

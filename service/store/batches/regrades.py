@@ -20,9 +20,12 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
 from service.store.grades import overrides
 from service.store.grades.overrides import CriterionMarks
-from service.store.models import AssignmentVersion, Batch, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.queue.jobs import enqueue
 from service.store.states import UNFINISHED, JobQueue, JobState, Standing
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import UsageError
 
 _CHANGES_A_PAGE = 50

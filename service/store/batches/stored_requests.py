@@ -12,7 +12,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.courses.assignment_versions import assignment_from_bytes
-from service.store.models import AssignmentVersion, Job, SubmissionRow
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from submissions.grading_request import GradingRequest
 from submissions.stored_submission import unpack_submission

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from service.store.codec import decode, encode
 from service.store.conditional_insert import insert_if_new
-from service.store.models import AssignmentVersion
+from service.store.tables.courses import AssignmentVersion
 from sim.errors import UsageError
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.suggestions import suggest_name

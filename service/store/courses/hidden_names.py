@@ -16,8 +16,8 @@ from sqlalchemy import select
 from service.store.courses.open_assignments import match_anonymous_assignments
 from service.store.engine import Store
 from service.store.installation import require_secret
-from service.store.models import Installation
-from service.store.web_tables import OpenAssignment
+from service.store.tables.courses import OpenAssignment
+from service.store.tables.installation import Installation
 
 _LABEL_LENGTH = 6
 

@@ -19,8 +19,8 @@ from service.store.courses import policies
 from service.store.courses.assignment_versions import FrozenAssignment, assignment_from_bytes, store_version
 from service.store.engine import now
 from service.store.locks import lock_course
-from service.store.models import AssignmentVersion, Batch
-from service.store.web_tables import OpenAssignment
+from service.store.tables.courses import AssignmentVersion, OpenAssignment
+from service.store.tables.submissions import Batch
 from sim.errors import UsageError
 
 if TYPE_CHECKING:

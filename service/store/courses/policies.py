@@ -18,8 +18,10 @@ from sqlalchemy.orm import Session
 from service.store.conditional_insert import insert_if_new
 from service.store.courses.local_days import add_days, count_days_after, find_local_zone
 from service.store.engine import now
-from service.store.models import Enrolment, Extension, Job, Policy, SubmissionRow
 from service.store.states import JobState
+from service.store.tables.courses import Extension, Policy
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 
 _ALWAYS = frozenset({"visible"})
 _AFTER_DUE_DATE = frozenset({"after_due_date"})

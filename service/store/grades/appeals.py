@@ -13,9 +13,11 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
 from service.store.grades import current_grades
 from service.store.locks import lock_submissions
-from service.store.models import AssignmentVersion, Enrolment, Job, SubmissionRow
 from service.store.states import Standing
-from service.store.web_tables import Appeal
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import Appeal
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
 MAX_TEXT_LENGTH = 4000

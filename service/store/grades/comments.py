@@ -14,8 +14,8 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import now
-from service.store.models import CriterionResultRow, Job
-from service.store.web_tables import Comment
+from service.store.tables.grades import Comment, CriterionResultRow
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 
 MAX_COMMENT_LENGTH = 2000

@@ -11,8 +11,8 @@ from typing import Protocol
 from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, or_, select, tuple_
 from sqlalchemy.orm import aliased
 
-from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
+from service.store.tables.submissions import Job, SubmissionRow
 
 #: Condition on a job: it is graded, and its worker is not known to grade incorrectly.
 IS_TRUSTED: tuple[ColumnElement[bool], ...] = (Job.state == JobState.DONE, Job.suspect.is_(None))

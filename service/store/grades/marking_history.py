@@ -15,8 +15,8 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store import audit
 from service.store.audit import AuditEntry
-from service.store.models import SubmissionRow
-from service.store.web_tables import Appeal, Comment, Override
+from service.store.tables.grades import Appeal, Comment, Override
+from service.store.tables.submissions import SubmissionRow
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 from service.store import audit
 from service.store.engine import now
 from service.store.locks import lock_jobs
-from service.store.models import CriterionResultRow, Job
 from service.store.states import JobState
-from service.store.web_tables import Override
+from service.store.tables.grades import CriterionResultRow, Override
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 from submissions.suggestions import suggest_name
 

@@ -9,8 +9,8 @@ from decimal import Decimal
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.models import Job, SubmissionRow
 from service.store.states import JobState, Standing
+from service.store.tables.submissions import Job, SubmissionRow
 
 _MAX_LISTED = 50
 

@@ -14,9 +14,9 @@ from sqlalchemy.orm import Session
 from service.store import artifacts, phases
 from service.store.engine import Store, now, retry_conflicts
 from service.store.locks import match_and_lock_jobs
-from service.store.models import Job
 from service.store.revision import needs_newer_code
 from service.store.states import PlotState
+from service.store.tables.submissions import Job
 
 MAX_ATTEMPTS = 3
 _PREFIX, _SUFFIX = "plot-", ".png"

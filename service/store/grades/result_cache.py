@@ -14,8 +14,11 @@ from sqlalchemy.orm import Session
 
 from service.store import phases
 from service.store.grades import current_grades
-from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow, TrialRow, Worker
 from service.store.states import PlotState
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import Artifact, CriterionResultRow, TrialRow
+from service.store.tables.installation import Worker
+from service.store.tables.submissions import Job, SubmissionRow
 
 #: The end of such a trial depends on the machine and its load, so another run may differ.
 _NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")

@@ -34,7 +34,10 @@ from service.store.codec import decode, encode
 from service.store.grades import comments, overrides
 from service.store.grades.overrides import OverrideLine
 from service.store.grades.recording_texts import texts_from_bytes
-from service.store.models import AssignmentVersion, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import Image, Recording
 from sim.recording_values import collect_faults

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from service.grading.class_statistics import MarkedCriterion, MarkedSubmission, scale_marks
 from service.store.grades import current_grades, overrides
-from service.store.models import CriterionResultRow
+from service.store.tables.grades import CriterionResultRow
 
 #: Number of jobs per query: databases limit the number of parameters.
 _CHUNK_SIZE = 1000

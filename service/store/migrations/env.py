@@ -10,8 +10,8 @@ from alembic.runtime.migration import MigrationContext, MigrationInfo
 from alembic.script import Script
 from sqlalchemy import delete, insert
 
-from service.store.models import SchemaCompatibility
-from service.store.web_tables import METADATA
+from service.store.tables import METADATA
+from service.store.tables.installation import SchemaCompatibility
 
 
 def _write_oldest_compatible(

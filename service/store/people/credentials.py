@@ -18,7 +18,6 @@ from sqlalchemy.orm import Session, aliased
 from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
 from service.store.ids import generate_id
-from service.store.models import Enrolment, Person
 from service.store.people.reach import (
     UNLIMITED_REACH,
     Reach,
@@ -28,7 +27,7 @@ from service.store.people.reach import (
     match_reached_enrolments,
 )
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential
+from service.store.tables.people import Credential, Enrolment, Person
 
 SESSION_LIFETIME = timedelta(days=7)
 LINK_LIFETIME = timedelta(days=2)

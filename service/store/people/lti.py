@@ -16,12 +16,21 @@ from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
-from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials
 from service.store.people.membership import has_other_access, is_from_platform, set_role
 from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.states import Role
-from service.store.web_tables import Credential, LtiCourse, LtiKey, LtiLaunch, LtiPerson, LtiPlatform
+from service.store.tables.courses import Course
+from service.store.tables.people import (
+    Credential,
+    Enrolment,
+    LtiCourse,
+    LtiKey,
+    LtiLaunch,
+    LtiPerson,
+    LtiPlatform,
+    Person,
+)
 from sim.errors import UsageError
 from submissions.student_identity import Student
 

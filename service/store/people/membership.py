@@ -11,11 +11,11 @@ from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
-from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials
 from service.store.people.students import Students, ensure_course
 from service.store.states import Role
-from service.store.web_tables import Credential, LtiPerson
+from service.store.tables.courses import Course
+from service.store.tables.people import Credential, Enrolment, LtiPerson, Person
 from sim.errors import UsageError
 from submissions.student_identity import Student
 from submissions.student_names import normalise_name

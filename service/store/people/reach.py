@@ -10,9 +10,8 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, select
 
-from service.store.models import Enrolment
 from service.store.states import Role
-from service.store.web_tables import Credential, LtiCourse
+from service.store.tables.people import Credential, Enrolment, LtiCourse
 
 
 @dataclass(frozen=True, slots=True)

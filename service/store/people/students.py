@@ -12,8 +12,9 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
-from service.store.models import Course, Enrolment, Person
 from service.store.states import Role
+from service.store.tables.courses import Course
+from service.store.tables.people import Enrolment, Person
 from sim.errors import UsageError
 from submissions.raw_files import sanitise_name
 from submissions.student_identity import Student

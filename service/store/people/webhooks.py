@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 from service.store.engine import now
 from service.store.outbox import WebhookEvent
-from service.store.web_tables import Delivery, Webhook
+from service.store.tables.courses import Delivery, Webhook
 from sim.errors import UsageError
 
 MAX_URL_LENGTH = 1000

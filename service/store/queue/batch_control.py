@@ -13,10 +13,10 @@ from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
 from service.store.locks import match_and_lock_jobs
-from service.store.models import Batch, Job, SubmissionRow
 from service.store.queue import jobs
 from service.store.states import BatchState, JobState
-from service.store.web_tables import OpenAssignment
+from service.store.tables.courses import OpenAssignment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import UsageError
 
 

@@ -8,8 +8,10 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.models import Batch, Course, Enrolment, Job
 from service.store.states import JobQueue, JobState
+from service.store.tables.courses import Course
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 
 #: Maximum number listed, newest first.
 MAX_LISTED = 100

@@ -22,11 +22,11 @@ from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import overrides, plots, result_cache
 from service.store.installation import load_secret
 from service.store.locks import match_and_lock_jobs
-from service.store.models import Job
 from service.store.queue import workers
 from service.store.queue.scheduling import find_next_job
 from service.store.revision import needs_newer_code
 from service.store.states import CancelReason, JobState, PlotState
+from service.store.tables.submissions import Job
 from service.version import hash_grader
 from sim.errors import Cancelled, HostError
 

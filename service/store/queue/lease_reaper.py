@@ -14,11 +14,11 @@ from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
 from service.store.locks import match_and_lock_jobs
-from service.store.models import Job
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim, RetryPolicy
 from service.store.queue.scheduling import match_claimable_jobs
 from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job
 
 #: Databases limit the number of parameters of a statement.
 _CHUNK_SIZE = 500

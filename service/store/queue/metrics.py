@@ -16,10 +16,13 @@ from sqlalchemy.orm import Session
 
 from service.store import phases
 from service.store.engine import now
-from service.store.models import Batch, CriterionResultRow, Enrolment, Job, TrialRow, Worker
 from service.store.queue import workers
 from service.store.queue.scheduling import match_claimable_jobs
 from service.store.states import UNFINISHED, BatchState, JobQueue, JobState, PlotState
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.installation import Worker
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 
 #: Durations cover the newest jobs that ended within this time.
 TIMES_WINDOW = timedelta(hours=1)

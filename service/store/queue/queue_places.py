@@ -13,10 +13,11 @@ from sqlalchemy import and_, case, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.models import Enrolment, Job
 from service.store.queue import workers
 from service.store.queue.scheduling import match_claimable_jobs, select_recent_jobs, select_shares
 from service.store.states import JobQueue, JobState
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job
 
 #: Estimates use the mean of this number of recent gradings.
 _MAX_MEASURED_JOBS = 20

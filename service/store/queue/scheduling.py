@@ -10,9 +10,10 @@ from datetime import datetime, timedelta
 from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, not_, or_, select
 from sqlalchemy.orm import Session
 
-from service.store.models import Batch, Enrolment, Job
 from service.store.queue.workers import match_other_live_worker
 from service.store.states import BatchState, JobQueue, JobState
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 
 #: Shares count only jobs started within this time, so earlier use is no disadvantage.
 SHARE_WINDOW = timedelta(seconds=60)

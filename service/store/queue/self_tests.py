@@ -17,9 +17,10 @@ from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import current_grades
 from service.store.locks import lock_jobs, lock_submissions
-from service.store.models import Batch, Job, SelfTest, SubmissionRow, Worker
 from service.store.queue import jobs
 from service.store.states import BatchState, JobQueue, Standing
+from service.store.tables.installation import SelfTest, Worker
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from service.version import GRADER_VERSION, hash_grader
 
 _RETENTION = timedelta(days=30)

@@ -13,10 +13,11 @@ from sqlalchemy import ColumnElement, CursorResult, and_, delete, func, or_, sel
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
-from service.store.models import AssignmentVersion, Enrolment
 from service.store.revision import needs_newer_code
 from service.store.states import RunState
-from service.store.web_tables import Tryout
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Tryout
 from sim.errors import UsageError
 
 #: Test runs of one student within an hour.

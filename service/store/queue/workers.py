@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
-from service.store.models import Heartbeat, Worker
+from service.store.tables.installation import Heartbeat, Worker
 
 #: A worker with a heartbeat within this time is considered alive.
 ALIVE_PERIOD = timedelta(seconds=30)

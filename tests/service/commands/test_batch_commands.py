@@ -21,8 +21,8 @@ from command import COMMAND
 from service.reports.output_files import build_file_stem
 from service.settings import Settings
 from service.store.engine import open_store
-from service.store.models import Job
 from service.store.states import JobState
+from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
 
 

@@ -26,8 +26,9 @@ from service.reports.formats import FORMATS
 from service.reports.output_files import build_file_stem
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.models import CriterionResultRow, Job, TrialRow
 from service.store.states import JobQueue, JobState
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
 
 SPIN = "while True:\n    pass\n"

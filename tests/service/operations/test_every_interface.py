@@ -25,10 +25,11 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import now
 from service.store.grades import appeals, comments, overrides
-from service.store.models import Enrolment, Job
 from service.store.people import webhooks
 from service.store.queue import jobs, test_runs
 from service.store.states import JobState
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job
 from submissions.assignment.reader import find_assignment
 from submissions.stored_submission import pack_submission
 from web import COURSE, Web, grade_all

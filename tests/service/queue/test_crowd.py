@@ -29,8 +29,9 @@ from service.queue.processes import end_processes
 from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.models import Enrolment, Job
 from service.store.states import UNFINISHED, JobQueue, JobState
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission

@@ -27,10 +27,10 @@ from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.batches.intake import accept_submission
 from service.store.engine import IMPATIENT_SECONDS, SQLITE_BUSY_SECONDS, Store
-from service.store.models import Job
 from service.store.queue import jobs
 from service.store.queue.lease_reaper import requeue_lost_jobs
 from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job
 from sim.errors import Cancelled, HostError
 from submissions.grading_request import GradingRequest
 from submissions.submission import Submission

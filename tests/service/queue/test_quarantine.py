@@ -40,9 +40,10 @@ from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import results
 from service.store.installation import load_secret
-from service.store.models import Job, SelfTest
 from service.store.queue import jobs, self_tests, workers
 from service.store.states import JobQueue, JobState, Standing
+from service.store.tables.installation import SelfTest
+from service.store.tables.submissions import Job
 from sim.recording import Recording
 
 MOVE = (

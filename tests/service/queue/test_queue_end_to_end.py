@@ -35,8 +35,9 @@ from service.store.batches.stored_requests import load_grading_request
 from service.store.engine import Store, open_store
 from service.store.grades import results
 from service.store.installation import load_secret
-from service.store.models import CriterionResultRow, Job, TrialRow
 from service.store.states import JobQueue, JobState, PlotState
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
 from submissions.batch_folder import read_batch
 from submissions.grading_request import GradingRequest

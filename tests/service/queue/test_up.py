@@ -27,8 +27,8 @@ from service.settings import Settings
 from service.store import phases
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.states import JobState, PlotState
+from service.store.tables.submissions import Job
 from service.web.listening_sockets import listen
 from sim.errors import UsageError
 

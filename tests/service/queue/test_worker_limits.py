@@ -21,9 +21,9 @@ from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.models import Job
 from service.store.queue import workers
 from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job
 
 DRIVES_LONG = (
     "from ev3dev2.motor import MoveTank, OUTPUT_B, OUTPUT_C, SpeedPercent\n"

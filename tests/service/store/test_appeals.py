@@ -15,8 +15,8 @@ from service.store.courses.hidden_names import HiddenNames, load_hidden_names
 from service.store.engine import Store
 from service.store.grades import appeals, results
 from service.store.grades.appeals import MAX_TEXT_LENGTH
-from service.store.models import SubmissionRow
 from service.store.queue import jobs
+from service.store.tables.submissions import SubmissionRow
 from sim.errors import UsageError
 
 NONE_HIDDEN = HiddenNames(frozenset(), b"")

@@ -29,13 +29,15 @@ from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, is_conflict, retry_conflicts
 from service.store.grades import appeals, overrides, results
-from service.store.models import Base, Extension, Job, Policy
 from service.store.people import lti
 from service.store.people.lti import Registration
 from service.store.queue import jobs, lease_reaper, self_tests, test_runs
 from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobQueue, JobState, Standing
-from service.store.web_tables import LtiKey, LtiPlatform
+from service.store.tables.base import Base
+from service.store.tables.courses import Extension, Policy
+from service.store.tables.people import LtiKey, LtiPlatform
+from service.store.tables.submissions import Job
 from sim.errors import Cancelled, UsageError
 
 GRADE = report_builders.faulty_grade()

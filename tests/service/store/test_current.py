@@ -23,12 +23,13 @@ from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store
 from service.store.grades import current_grades, overrides, results
-from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import lti
 from service.store.people.students import ensure_course
 from service.store.queue import jobs, self_tests
 from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobState, Standing
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Job, SubmissionRow
 
 GRADE = report_builders.faulty_grade()
 NOBODY = HiddenNames(frozenset(), b"")

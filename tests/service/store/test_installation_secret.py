@@ -25,7 +25,8 @@ from service.home_secret import load_home_secret
 from service.settings import Settings, load_settings
 from service.store.engine import open_store
 from service.store.installation import load_secret
-from service.store.models import Installation, Job
+from service.store.tables.installation import Installation
+from service.store.tables.submissions import Job
 from sim.errors import HostError, UsageError
 from submissions.assignment.examples import locate_examples
 from submissions.assignment.reader import find_assignment

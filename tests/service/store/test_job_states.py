@@ -20,10 +20,10 @@ from builders import grading_request
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
 from service.store.grades import results
-from service.store.models import Job, SubmissionRow
 from service.store.queue import jobs
 from service.store.queue.jobs import TRANSITIONS, Claim, LeaseLost, RetryPolicy, Transition
 from service.store.states import CancelReason, JobState
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError
 
 WORKER = "worker"

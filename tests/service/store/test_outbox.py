@@ -20,12 +20,11 @@ from service.store import ids, outbox
 from service.store.batches import intake
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Course
 from service.store.people import credentials, membership, webhooks
 from service.store.people.reach import Reach
 from service.store.queue import jobs
 from service.store.states import CredentialKind
-from service.store.web_tables import Delivery
+from service.store.tables.courses import Course, Delivery
 from sim.errors import UsageError
 from submissions.student_identity import Student
 

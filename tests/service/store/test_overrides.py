@@ -34,8 +34,8 @@ from service.store.engine import Store
 from service.store.grades import comments, marking_history, overrides, results
 from service.store.grades.statistics_marks import load_marked_submissions
 from service.store.installation import load_secret
-from service.store.models import Job
 from service.store.queue import jobs
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 
 #: 5 of 6 for the first criterion, 2 of 2 for the second.

@@ -18,11 +18,11 @@ from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import audit
 from service.store.engine import Store
-from service.store.models import Enrolment, Person
 from service.store.people import credentials, membership
 from service.store.people.credentials import MAX_TOKENS
 from service.store.people.membership import Member
 from service.store.states import CredentialKind, Role
+from service.store.tables.people import Enrolment, Person
 from submissions.student_identity import Student
 
 ROOT = Actor("root", operator=True)

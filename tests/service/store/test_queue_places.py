@@ -13,11 +13,11 @@ from builders import accept_one, grading_request
 from service.store.batches.intake import accept_batch, accept_submission
 from service.store.engine import Store, now
 from service.store.grades import results
-from service.store.models import Job
 from service.store.queue import jobs, workers
 from service.store.queue.queue_places import QueuePlace, estimate_place
 from service.store.queue.workers import WorkerDescription
 from service.store.states import JobQueue
+from service.store.tables.submissions import Job
 
 
 def _place(store: Store, job_id: str) -> QueuePlace:

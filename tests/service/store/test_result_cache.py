@@ -19,9 +19,9 @@ from service.store.batches.intake import AcceptedSubmission, accept_batch, accep
 from service.store.engine import Store
 from service.store.grades import plots, results
 from service.store.installation import load_secret
-from service.store.models import Job
 from service.store.queue import jobs, metrics, self_tests
 from service.store.states import JobState, PlotState, Standing
+from service.store.tables.submissions import Job
 from sim.recording import Verdict
 from submissions.grading_request import GradingRequest
 from submissions.seeds import Secret

@@ -15,9 +15,9 @@ from builders import accept_one, grading_request
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Job
 from service.store.queue import jobs, self_tests
 from service.store.states import JobState, Standing
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 
 GRADE = report_builders.faulty_grade()

@@ -20,11 +20,13 @@ from service.store.batches.intake import accept_batch, accept_new_submissions
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import load_secret
-from service.store.models import Artifact, Batch, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
 from service.store.states import JobState
-from service.store.web_tables import METADATA, Appeal, Comment, Override
+from service.store.tables import METADATA
+from service.store.tables.grades import Appeal, Artifact, Comment, Override, TrialRow
+from service.store.tables.people import Enrolment, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from submissions.student_identity import RejectedSubmission
 

@@ -17,10 +17,10 @@ from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import load_hidden_names
 from service.store.engine import Store
-from service.store.models import Batch, Job, SubmissionRow
 from service.store.queue import jobs
 from service.store.queue.lease_reaper import count_missing_notices
 from service.store.states import BatchState, JobQueue, JobState
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import UsageError
 from submissions.grading_request import GradingRequest
 

@@ -22,8 +22,10 @@ from service.store.batches.stored_requests import load_grading_request
 from service.store.columns import make_storable
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Artifact, AssignmentVersion, CriterionResultRow, Job, SubmissionRow
 from service.store.queue import jobs
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.grades import Artifact, CriterionResultRow
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import TimedText
 

@@ -20,12 +20,15 @@ from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
 from service.store.grades import plots, results
-from service.store.models import Batch, Course, CriterionResultRow, Enrolment, Job, SubmissionRow, TrialRow
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim, LeaseLost, RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, mark_notified, requeue_lost_jobs
 from service.store.queue.scheduling import BATCH_JOB_INTERVAL
 from service.store.states import BatchState, JobQueue, JobState, PlotState
+from service.store.tables.courses import Course
+from service.store.tables.grades import CriterionResultRow, TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from submissions.student_identity import RejectedSubmission
 
 NO_WAIT = RetryPolicy(0.0)

@@ -29,12 +29,15 @@ from service.store.courses.policies import ExceededLimit
 from service.store.engine import Store, open_engine, open_store
 from service.store.grades import results
 from service.store.migrate import apply_migrations, build_alembic_config
-from service.store.models import Artifact, Batch, CriterionResultRow, Enrolment, Job, Person, SubmissionRow, TrialRow
 from service.store.queue import jobs
 from service.store.recorded_schema import read_statements
 from service.store.revision import find_newest_revision, load_current_revision, load_schema_state, read_revision
 from service.store.states import CancelReason, JobState, Role, Standing
-from service.store.web_tables import METADATA, Credential, LtiCourse, LtiPlatform, OpenAssignment
+from service.store.tables import METADATA
+from service.store.tables.courses import OpenAssignment
+from service.store.tables.grades import Artifact, CriterionResultRow, TrialRow
+from service.store.tables.people import Credential, Enrolment, LtiCourse, LtiPlatform, Person
+from service.store.tables.submissions import Batch, Job, SubmissionRow
 from sim.errors import HostError
 from submissions.student_identity import RejectedSubmission
 

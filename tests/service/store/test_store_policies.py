@@ -19,10 +19,10 @@ from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
 from service.store.grades import results
-from service.store.models import Job, SubmissionRow
 from service.store.people.students import Students, ensure_course
 from service.store.queue import jobs
 from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.recording import Verdict
 from submissions.student_identity import Student
 

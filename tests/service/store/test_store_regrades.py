@@ -22,9 +22,10 @@ from service.store.batches.intake import accept_batch, accept_new_submissions
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES
 from service.store.engine import Store
 from service.store.grades import results
-from service.store.models import Batch, Enrolment, Job
 from service.store.queue import jobs
 from service.store.states import JobState, Standing
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 from sim.errors import UsageError
 
 GRADE = report_builders.faulty_grade()

@@ -16,11 +16,12 @@ from service.settings import Settings
 from service.store import phases
 from service.store.engine import Store
 from service.store.grades import plots, results
-from service.store.models import Heartbeat, Job
 from service.store.queue import jobs, metrics, workers
 from service.store.queue.jobs import RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, requeue_lost_jobs
 from service.store.states import JobQueue, JobState
+from service.store.tables.installation import Heartbeat
+from service.store.tables.submissions import Job
 
 pytestmark = pytest.mark.fast
 

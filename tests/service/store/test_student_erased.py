@@ -25,24 +25,18 @@ from service.store.batches import intake
 from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import marking_history, results
-from service.store.models import Enrolment, Job, SubmissionRow
 from service.store.people import credentials, membership
 from service.store.people.reach import Reach
 from service.store.people.students import ensure_course
 from service.store.purge import PurgeCounts, purge_submissions
 from service.store.queue import jobs
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import (
-    METADATA,
-    Appeal,
-    Comment,
-    IdempotentReply,
-    LtiPerson,
-    LtiPlatform,
-    OpenAssignment,
-    Override,
-    Tryout,
-)
+from service.store.tables import METADATA
+from service.store.tables.courses import OpenAssignment
+from service.store.tables.grades import Appeal, Comment, Override
+from service.store.tables.installation import IdempotentReply
+from service.store.tables.people import Enrolment, LtiPerson, LtiPlatform
+from service.store.tables.submissions import Job, SubmissionRow, Tryout
 from service.student_export import export_student
 from sim.errors import UsageError
 from submissions.student_identity import RejectedSubmission, Student

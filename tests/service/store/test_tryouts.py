@@ -14,7 +14,7 @@ from service.store.people.students import Students, ensure_course
 from service.store.queue import test_runs
 from service.store.queue.test_runs import MAX_TEST_RUNS_PER_HOUR, StudentTestRun
 from service.store.states import RunState
-from service.store.web_tables import Tryout
+from service.store.tables.submissions import Tryout
 from sim.errors import UsageError
 from submissions.stored_submission import pack_submission
 from submissions.student_identity import Student

@@ -10,8 +10,8 @@ import pytest
 from httpx2 import Response
 from starlette.testclient import TestClient
 
-from service.store.models import Job
 from service.store.queue import test_runs
+from service.store.tables.submissions import Job
 from submissions.assignment.export import create_assignment
 from web import Web, web_in
 from web_world import World, make_world

@@ -10,7 +10,7 @@ import pytest
 from builders import grading_request
 from report_builders import faulty_grade
 from service.store.batches import intake
-from service.store.web_tables import Appeal
+from service.store.tables.grades import Appeal
 from web import COURSE, Web, grade_all, words
 
 _MANY = 130

@@ -11,8 +11,9 @@ from starlette.testclient import TestClient
 import report_builders
 from service.store import audit
 from service.store.courses import open_assignments, policies
-from service.store.models import Enrolment, SubmissionRow
 from service.store.states import Role
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import SubmissionRow
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.reader import find_in_catalogue
 from web import Web, grade_all, submit, words

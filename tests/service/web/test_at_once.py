@@ -17,8 +17,8 @@ from service.settings import Settings
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
-from service.store.models import Enrolment, SubmissionRow
-from service.store.web_tables import LtiKey
+from service.store.tables.people import Enrolment, LtiKey
+from service.store.tables.submissions import SubmissionRow
 from web import Web, submit, web_in
 
 _FILES = [("files", ("robot.py", PROGRAM)), ("files", ("responder.py", "def responder(msg):\n    return msg\n"))]

@@ -28,8 +28,10 @@ from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import result_cache
 from service.store.installation import load_secret
-from service.store.models import Batch, Enrolment, Job, TrialRow
 from service.store.states import BatchState, JobState, Standing
+from service.store.tables.grades import TrialRow
+from service.store.tables.people import Enrolment
+from service.store.tables.submissions import Batch, Job
 from service.version import hash_grader
 from submissions.assignment.folder import locate_assignment_folder
 from submissions.student_identity import RejectedSubmission, Student

@@ -17,7 +17,7 @@ from service.operations import replies
 from service.queue import notifier
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
-from service.store.models import SubmissionRow
+from service.store.tables.submissions import SubmissionRow
 from web import Web, submit
 
 

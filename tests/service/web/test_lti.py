@@ -28,12 +28,12 @@ from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import results
-from service.store.models import Job
 from service.store.people import lti, membership
 from service.store.people.lti import Registration
 from service.store.queue import jobs
 from service.store.states import Role
-from service.store.web_tables import LtiCourse, LtiLaunch
+from service.store.tables.people import LtiCourse, LtiLaunch
+from service.store.tables.submissions import Job
 from service.web.access import CSRF_FIELD
 from service.web.rate_limits import RateLimit
 from web import Web, csrf, grade_all, web_in

@@ -22,13 +22,13 @@ from service.lti.platform_requests import PlatformError, PlatformReply
 from service.lti.services import Score
 from service.store.batches import intake
 from service.store.engine import Store, now
-from service.store.models import Course, Enrolment, Person
 from service.store.people import credentials, lti, membership
 from service.store.people.lti import CourseLink, LaunchResult, Platform, Registration
 from service.store.people.reach import UNLIMITED_REACH, Reach
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential, LtiCourse, LtiPerson
+from service.store.tables.courses import Course
+from service.store.tables.people import Credential, Enrolment, LtiCourse, LtiPerson, Person
 from sim.errors import UsageError
 from submissions.student_identity import Student
 

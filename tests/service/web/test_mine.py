@@ -21,11 +21,11 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import results
-from service.store.models import Job
 from service.store.people.membership import Member
 from service.store.queue import jobs, workers
 from service.store.queue.workers import WorkerDescription
 from service.store.states import JobState
+from service.store.tables.submissions import Job
 from submissions.assignment.definition import Assignment
 from web import Web, submit, web_in
 

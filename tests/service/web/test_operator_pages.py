@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from builders import grading_request
 from service.store.batches.intake import accept_new_submissions
-from service.store.models import Job
 from service.store.queue import jobs
 from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobState
+from service.store.tables.submissions import Job
 from web import Web, submit, words
 
 AT_ONCE = RetryPolicy(backoff_seconds=0)

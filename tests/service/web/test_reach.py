@@ -18,7 +18,6 @@ from service.operations import people as operations
 from service.operations.context import Actor
 from service.operations.scopes import SCOPES
 from service.store.engine import now
-from service.store.models import Enrolment
 from service.store.people import credentials, lti, membership
 from service.store.people.credentials import MAX_SESSIONS, MAX_TOKENS
 from service.store.people.lti import Registration
@@ -26,7 +25,7 @@ from service.store.people.membership import Member
 from service.store.people.reach import Reach
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential, LtiCourse, LtiPerson
+from service.store.tables.people import Credential, Enrolment, LtiCourse, LtiPerson
 from service.web.access import SESSION_COOKIE
 from service.web.page_scopes import find_page_scope
 from sim.errors import UsageError

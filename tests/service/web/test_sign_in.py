@@ -14,7 +14,7 @@ from service.store.people import credentials, membership
 from service.store.people.membership import Member
 from service.store.people.reach import Reach
 from service.store.states import CredentialKind, Role
-from service.store.web_tables import Credential
+from service.store.tables.people import Credential
 from service.web.access import SESSION_COOKIE
 from sim.errors import UsageError
 from submissions.student_identity import Student

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 
 from service.store import audit
 from service.store.people import membership
-from service.store.web_tables import Credential
+from service.store.tables.people import Credential
 from web import Web, submit
 
 PEOPLE = "/courses/1/people"

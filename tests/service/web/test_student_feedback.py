@@ -21,10 +21,10 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import results
-from service.store.models import Job
 from service.store.people.membership import Member
 from service.store.queue import jobs, self_tests
 from service.store.queue.jobs import Claim, RetryPolicy
+from service.store.tables.submissions import Job
 from sim.errors import UsageError
 from student_reader import StudentReader
 from web import COURSE, Web

@@ -26,12 +26,12 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import comments
-from service.store.models import Job, SubmissionRow
 from service.store.people import credentials
 from service.store.people.membership import Member
 from service.store.people.students import ensure_course
 from service.store.queue import jobs
 from service.store.states import CredentialKind, JobQueue, JobState
+from service.store.tables.submissions import Job, SubmissionRow
 from service.web.access import build_actor
 from service.web.student_submissions import submit
 from sim.errors import UsageError

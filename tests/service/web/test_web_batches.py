@@ -20,10 +20,10 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import now
-from service.store.models import Batch, Job
 from service.store.people import webhooks
 from service.store.people.membership import Member
 from service.store.states import JobState
+from service.store.tables.submissions import Batch, Job
 from sim.errors import UsageError
 from web import Web, grade_all, submit
 

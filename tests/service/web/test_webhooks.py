@@ -17,8 +17,8 @@ from service import webhook_sender
 from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS, HttpResponse, Networks
 from service.store import outbox
 from service.store.engine import Store, now
-from service.store.models import Course
 from service.store.people import webhooks
+from service.store.tables.courses import Course
 from service.webhook_sender import start_due_deliveries
 
 
