@@ -55,21 +55,12 @@ class _BatchRow:
     problem: str = ""
 
 
-def read_batch(path: Path, assignment: str | None, people: People | None = None) -> BatchContents:
+def read_batch(path: Path, assignment: Assignment | None, people: People | None) -> BatchContents:
     """Read every submission of a folder, zip or CSV roster.
 
     A folder or zip can be a download from Moodle, Gradescope or nbgrader. Otherwise it contains a subfolder, a .py or a
     .zip for each student. Without ``assignment``, each submission names its own. A roster names students and files;
     ``assignment`` applies to rows that name none. Students are looked up in ``people``.
-
-    Raises:
-        UsageError: ``path`` or ``assignment`` itself cannot be used.
-    """
-    return read_batch_for(path, None if assignment is None else find_assignment(assignment), people)
-
-
-def read_batch_for(path: Path, assignment: Assignment | None, people: People | None = None) -> BatchContents:
-    """Read every submission as ``read_batch`` does, for an assignment that is already loaded.
 
     Raises:
         UsageError: ``path`` itself cannot be used.

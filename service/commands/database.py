@@ -5,15 +5,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from service.commands.installation import open_installation
-from service.commands.output import print_json, print_line, print_note
-from service.operations import database, privacy
+from service.commands.output import print_json, print_line
+from service.commands.privacy import remove_or_count
+from service.operations import database
 from service.settings import load_settings
 from sim.errors import UsageError
 from submissions.roster import parse_time
@@ -56,21 +56,10 @@ def purge_database(
         earliest_time = parse_time(before)
     except ValueError:
         raise UsageError(f"--before {before}: expected a date like 2025-09-01") from None
-    if archive is not None and for_good:
-        raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
-    only_count = archive is None and not for_good
-    with open_installation() as (service, actor):
-        if archive is not None:
-            print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
-        removed_counts = (database.count_old_submissions if only_count else database.remove_old_submissions)(
-            service, actor, earliest_time
-        )
-    count_text = (
-        f"{removed_counts.submissions} submissions, {removed_counts.grades} grades, {removed_counts.students} students"
-    )
-    print_json(removed=not only_count, archive=archive, **asdict(removed_counts))
-    print_line(
-        f"{count_text} to remove; use --archive FILE or --for-good to remove them"
-        if only_count
-        else f"removed: {count_text}"
+    remove_or_count(
+        archive,
+        for_good,
+        lambda service, actor, only_count: database.remove_old_submissions(
+            service, actor, earliest_time, only_count=only_count
+        ),
     )

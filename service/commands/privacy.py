@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -14,8 +15,9 @@ import typer
 from service.commands.installation import open_installation
 from service.commands.output import print_json, print_line, print_note
 from service.operations import courses, people, privacy
+from service.operations.context import Actor, Service
 from service.operations.courses import DEFAULT_COURSE
-from service.operations.privacy import PurgeRequest
+from service.operations.privacy import PurgeCounts, PurgeRequest
 from sim.errors import UsageError
 
 StudentArgument = Annotated[str, typer.Argument(help="The student's name, as submitted.")]
@@ -69,14 +71,26 @@ def purge_course(
 
     Without --archive or --for-good, show how much would be removed.
     """
+    remove_or_count(
+        archive,
+        for_good,
+        lambda service, actor, only_count: privacy.purge(
+            service, actor, courses.find(service, actor, DEFAULT_COURSE), PurgeRequest(older_than, only_count)
+        ),
+    )
+
+
+def remove_or_count(
+    archive: Path | None, for_good: bool, remove: Callable[[Service, Actor, bool], PurgeCounts]
+) -> None:
+    """Remove data after a backup to ``archive``, or ``for_good``; without either, only count it. Print the counts."""
     if archive is not None and for_good:
         raise UsageError("--archive keeps a copy and --for-good keeps none; use one of them")
     only_count = archive is None and not for_good
     with open_installation() as (service, actor):
-        course_id = courses.find(service, actor, DEFAULT_COURSE)
         if archive is not None:
             print_note(f"{archive}: {privacy.archive(service, actor, archive)} bytes")
-        removed_counts = privacy.purge(service, actor, course_id, PurgeRequest(older_than, only_count))
+        removed_counts = remove(service, actor, only_count)
     count_text = (
         f"{removed_counts.submissions} submissions, {removed_counts.grades} grades, {removed_counts.students} students"
     )

@@ -53,9 +53,9 @@ class Listing:
         """Return whether this is a cell with a robot program."""
         return self.magic_place is not None and is_program_magic(self.lines[self.magic_place])
 
-    def find_line(self, pattern: re.Pattern[str], start: int = 0) -> int | None:
-        """Return the number, from 1, of the first line after ``start`` that matches; None if no line does."""
-        return next((n for n, line in enumerate(self.lines[start:], start + 1) if pattern.search(line)), None)
+    def find_line(self, pattern: re.Pattern[str]) -> int | None:
+        """Return the number, from 1, of the first line that matches; None if no line does."""
+        return next((n for n, line in enumerate(self.lines, 1) if pattern.search(line)), None)
 
     def locate(self, line: int | None) -> str:
         """Return ``line 3 of robot.py``, or only the name if the line is unknown."""

@@ -24,7 +24,6 @@ _RESPONDER = re.compile(r"responder\Z|\w+_responder\Z")
 _RETURN = re.compile(r"\breturn\b")
 _COLON = (('":"',), ("':'",))
 _MAX_CONTENT_LENGTH = 12
-_PY = re.compile(r"""["']PY::""")
 
 
 def hint_about_misnamed_function(clues: Clues) -> Iterator[str]:

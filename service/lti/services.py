@@ -57,7 +57,6 @@ class Score:
     marks: Decimal
     max_marks: Decimal
     at: datetime
-    comment: str = ""
 
 
 def fetch_members(store: Store, link: CourseLink) -> list[PlatformMember]:
@@ -101,10 +100,10 @@ def send_scores(store: Store, link: CourseLink, assignment: str, title: str, sco
             "userId": score.subject,
             "scoreGiven": float(score.marks),
             "scoreMaximum": float(score.max_marks),
+            "comment": "",
             "timestamp": score.at.isoformat(timespec="milliseconds"),
             "activityProgress": "Completed",
             "gradingProgress": "FullyGraded",
-            "comment": score.comment,
         }
         headers = {"content-type": _SCORE, "authorization": f"Bearer {token}"}
         _send_request(link.platform, scores_url, method="POST", body=json.dumps(body).encode(), headers=headers)

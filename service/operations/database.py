@@ -49,16 +49,12 @@ def restore(service: Service, actor: Actor, file: Path) -> str:
     return service.store.engine.url.render_as_string(hide_password=True)
 
 
-def count_old_submissions(service: Service, actor: Actor, cutoff: datetime) -> PurgeCounts:
-    """Return the counts that ``remove_old_submissions`` would remove. Raises Forbidden unless called by a command."""
-    check_machine(actor)
-    return purge.purge_submissions(service.store, cutoff, actor.name, only_count=True)
-
-
-def remove_old_submissions(service: Service, actor: Actor, cutoff: datetime) -> PurgeCounts:
+def remove_old_submissions(service: Service, actor: Actor, cutoff: datetime, *, only_count: bool) -> PurgeCounts:
     """Remove submissions from before a moment, with grades, recordings, and students without remaining submissions.
+
+    With ``only_count``, return what would be removed.
 
     Raises Forbidden unless called by a command.
     """
     check_machine(actor)
-    return purge.purge_submissions(service.store, cutoff, actor.name)
+    return purge.purge_submissions(service.store, cutoff, actor.name, only_count=only_count)

@@ -21,7 +21,7 @@ from service.store.backup import back_up
 from service.store.courses import open_assignments
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course
-from service.store.purge import PurgeCounts
+from service.store.purge import PurgeCounts as PurgeCounts
 from service.store.states import Role
 
 _MAX_DAYS = 36_500

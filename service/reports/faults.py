@@ -54,11 +54,9 @@ class FaultGroup:
     excerpt: tuple[SourceLine, ...] = ()
 
 
-def describe_other_faults(
-    cause: str, grade: Grade, submission: Submission | None = None
-) -> Iterator[tuple[str, FaultGroup]]:
+def describe_other_faults(cause: str, grade: Grade) -> Iterator[tuple[str, FaultGroup]]:
     """Yield each fault with its description, shortened to the place if the cause already has its message."""
-    for group in group_faults(grade, submission, limit=10):
+    for group in group_faults(grade, limit=10):
         is_in_cause = group.message.rstrip(".") in cause
         yield (group.where if is_in_cause else f"{group.where}: {group.message}"), group
 
@@ -154,12 +152,12 @@ def _find_file(file: str, submission: Submission) -> SourceFile | None:
     return None
 
 
-def extract_excerpt(source: SourceFile, line: int, context_lines: int = 2) -> tuple[SourceLine, ...]:
-    """Return the line and its neighbours; empty if the source has no such line."""
+def extract_excerpt(source: SourceFile, line: int) -> tuple[SourceLine, ...]:
+    """Return the line with two neighbours on each side; empty if the source has no such line."""
     lines = source.text.rstrip("\n").split("\n")
     if not 1 <= line <= len(lines):
         return ()
-    first_line, last_line = max(1, line - context_lines), min(len(lines), line + context_lines)
+    first_line, last_line = max(1, line - 2), min(len(lines), line + 2)
     while first_line < line and not lines[first_line - 1].strip():
         first_line += 1
     return tuple(

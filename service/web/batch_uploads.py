@@ -12,7 +12,7 @@ from service.operations.context import Actor
 from service.web.context import WebContext
 from service.web.http_errors import TranslatableHTTPException
 from sim.sentences import Sentence
-from submissions.batch_folder import BatchContents, read_batch_for
+from submissions.batch_folder import BatchContents, read_batch
 from submissions.student_identity import People
 
 _UNPACKING_SECONDS = 30
@@ -42,6 +42,6 @@ def read_upload(
             503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
         )
     try:
-        return read_batch_for(path, batch_assignment, people)
+        return read_batch(path, batch_assignment, people)
     finally:
         context.unpacking.release()

@@ -188,7 +188,7 @@ def list_label_names(name: str) -> tuple[str, ...]:
     return _DEFINITIONS[name].label_names if name in _DEFINITIONS else ()
 
 
-def build_floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200, 800, 0)) -> Floor:  # noqa: B008
+def build_floor_from_image(name: str, data: bytes) -> Floor:
     """Return a floor made from an instructor's PNG or JPEG file of 2362 x 1143 pixels.
 
     Transparent parts become white.
@@ -205,7 +205,7 @@ def build_floor_from_image(name: str, data: bytes, default_pose: Pose = Pose(200
         ) from error
     paper = Image.new("RGBA", image.size, (255, 255, 255, 255))
     pixels = np.asarray(Image.alpha_composite(paper, image).convert("RGB"))
-    return Floor(name, _make_read_only(pixels), default_pose)
+    return Floor(name, _make_read_only(pixels), Pose(200, 800, 0))
 
 
 def _get_definition(name: str) -> _FloorDefinition:

@@ -14,15 +14,15 @@ MAX_TOKENS = 200_000
 _TOKEN = re.compile(r"\w++|[^\w\s]")
 
 
-def parse_module(text: str, max_tokens: int = MAX_TOKENS) -> ast.Module:
+def parse_module(text: str) -> ast.Module:
     """Parse a module and return its syntax tree.
 
     Raises:
         SyntaxError: The text is not Python.
         UnreadableDataError: Parsing would take too much work.
     """
-    if len(text) > max_tokens and sum(1 for _ in _TOKEN.finditer(text)) > max_tokens:
-        raise TooManyValuesError("it has more than %(most)s tokens", most=max_tokens)
+    if len(text) > MAX_TOKENS and sum(1 for _ in _TOKEN.finditer(text)) > MAX_TOKENS:
+        raise TooManyValuesError("it has more than %(most)s tokens", most=MAX_TOKENS)
     try:
         return ast.parse(text)
     except (RecursionError, MemoryError):

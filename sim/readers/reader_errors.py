@@ -21,15 +21,15 @@ class TooManyValuesError(UnreadableDataError):
     """The data contain more values than the limit."""
 
 
-def check_depth(structure: str, deepest: int = MAX_DEPTH) -> None:
-    """Raise UnreadableDataError if brackets are nested deeper than ``deepest``. ``structure`` contains no strings.
+def check_depth(structure: str) -> None:
+    """Raise UnreadableDataError if brackets are nested deeper than ``MAX_DEPTH``. ``structure`` contains no strings.
 
     Each pass removes all innermost pairs, so the number of passes is limited by the allowed depth.
     """
-    if structure.count("[") + structure.count("{") <= deepest:
+    if structure.count("[") + structure.count("{") <= MAX_DEPTH:
         return
     brackets = structure.encode("utf-8", "surrogatepass").translate(_TO_ROUND, _NO_BRACKETS)
-    for _ in range(deepest):
+    for _ in range(MAX_DEPTH):
         brackets = brackets.replace(b"()", b"")
-    if b"()" in brackets or brackets.count(b"(") > deepest:
+    if b"()" in brackets or brackets.count(b"(") > MAX_DEPTH:
         raise UnreadableDataError("it is nested too deeply")

@@ -26,7 +26,9 @@ from service.store.tables.installation import SchemaCompatibility
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment
 from submissions.assignment.reader import find_assignment
+from submissions.batch_folder import BatchContents, read_batch
 from submissions.grading_request import GradingRequest
+from submissions.student_identity import People
 from submissions.submission import Submission
 
 PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
@@ -112,3 +114,8 @@ def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:
 def _canonical(recording: Recording) -> bytes:
     # A builder's 560 and a stored 560.0 are the same number, written differently.
     return recordings.to_bytes(recordings.from_bytes(recordings.to_bytes(recording)))
+
+
+def read_named_batch(path: Path, assignment: str | None, people: People | None = None) -> BatchContents:
+    """Read a batch for the assignment with this id, or one whose submissions name their own."""
+    return read_batch(path, None if assignment is None else find_assignment(assignment), people)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from builders import read_named_batch
 from service.commands.grading import read_with_assignment
 from sim.errors import UsageError
 from submissions.assignment.folder import locate_assignment_folder
-from submissions.batch_folder import read_batch
 
 PROGRAM = "print('hello')\n"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -48,7 +48,7 @@ def class_folder(tmp_path: Path) -> Path:
 
 
 def test_every_bad_row_is_named_and_the_rest_taken(class_folder: Path) -> None:
-    checked = read_batch(class_folder, "echo-responder")
+    checked = read_named_batch(class_folder, "echo-responder")
     taken = [grading_request.submission.student for grading_request in checked.grading_requests]
     assert taken == ["Zoë 🤖", "ada", "no-responder"]
     assert "There is no responder.py" in checked.grading_requests[-1].submission.notes[0]
@@ -69,7 +69,7 @@ def test_a_zip_of_the_same_folder_is_the_same(class_folder: Path, tmp_path: Path
         for path in sorted(class_folder.rglob("*")):
             if path.is_file() and not path.is_symlink():
                 archive.write(path, prefix + str(path.relative_to(class_folder)))
-    checked = read_batch(tmp_path / "all.zip", "echo-responder")
+    checked = read_named_batch(tmp_path / "all.zip", "echo-responder")
     taken = [grading_request.submission.student for grading_request in checked.grading_requests]
     assert taken == ["Zoë 🤖", "ada", "no-responder"]
     assert "There is no responder.py" in checked.grading_requests[-1].submission.notes[0]
@@ -83,7 +83,7 @@ def test_each_submission_may_name_its_own_assignment(tmp_path: Path) -> None:
     _student(folder, "ada", toml='assignment = "echo-responder"\n')
     _student(folder, "bob", toml='assignment = "json-queue"\n')
     _student(folder, "eve", toml='assignment = "no-such-thing"\n')
-    checked = read_batch(folder, None)
+    checked = read_named_batch(folder, None)
     named = {
         grading_request.submission.student: grading_request.assignment.id
         for grading_request in checked.grading_requests
@@ -101,7 +101,7 @@ def test_a_submission_that_we_fail_on_is_the_only_one_that_is_refused(
     for name in ("ada", "bob"):
         _student(folder, name)
     _student(folder, "eve", toml=f"run = 0x{'f' * 20_000}\n")
-    checked = read_batch(folder, "echo-responder")
+    checked = read_named_batch(folder, "echo-responder")
     assert [each.submission.student for each in checked.grading_requests] == ["ada", "bob"]
     assert "number that is too long" in checked.refusals[0].reason
 
@@ -110,7 +110,7 @@ def test_a_submission_that_we_fail_on_is_the_only_one_that_is_refused(
 
     (folder / "bob" / "submission.toml").write_text("x = 1\n")
     monkeypatch.setattr("submissions.bundle.read_meta", lambda data, where: fails() if data else {})
-    checked = read_batch(folder, "echo-responder")
+    checked = read_named_batch(folder, "echo-responder")
     assert [each.submission.student for each in checked.grading_requests] == ["ada"]
     assert {each.source: "fault in Robomark" in each.reason for each in checked.refusals} == {"bob": True, "eve": True}
 
@@ -123,7 +123,7 @@ def test_a_submission_brings_no_assignment_of_its_own(tmp_path: Path, monkeypatc
     monkeypatch.chdir(folder)
     with pytest.raises(UsageError, match="no assignment 'eve' in the catalogue"):
         read_with_assignment(Path("eve"), None)
-    checked = read_batch(Path(), None)
+    checked = read_named_batch(Path(), None)
     assert checked.grading_requests == ()
     assert "no assignment 'eve' in the catalogue" in {each.source: each.reason for each in checked.refusals}["eve"]
 
@@ -132,7 +132,7 @@ def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
     folder = tmp_path / "class"
     _student(folder, "ada", toml='student = "bob"\n')
     _student(folder, "bob")
-    checked = read_batch(folder, "echo-responder")
+    checked = read_named_batch(folder, "echo-responder")
     assert checked.refusals == ()
     ada, bob = checked.grading_requests
     assert (ada.submission.student, bob.submission.student) == ("ada", "bob")
@@ -142,7 +142,7 @@ def test_in_a_batch_nobody_submits_for_somebody_else(tmp_path: Path) -> None:
 def test_a_folder_named_after_an_assignment_names_it(tmp_path: Path) -> None:
     folder = tmp_path / "echo-responder"
     _student(folder, "ada")
-    (grading_request,) = read_batch(folder, None).grading_requests
+    (grading_request,) = read_named_batch(folder, None).grading_requests
     assert grading_request.assignment.id == "echo-responder"
 
 
@@ -199,7 +199,7 @@ def _double_zip(tmp_path: Path) -> Path:
 def test_what_is_no_batch_is_refused_in_one_sentence(tmp_path: Path, make: object, expected: str) -> None:
     path = make(tmp_path)  # type: ignore[operator]
     with pytest.raises(UsageError, match=expected) as caught:
-        read_batch(path, "echo-responder")
+        read_named_batch(path, "echo-responder")
     assert "\n" not in str(caught.value)
 
 
@@ -208,9 +208,9 @@ def test_a_zip_that_grows_too_large_is_refused(tmp_path: Path, monkeypatch: pyte
     with zipfile.ZipFile(tmp_path / "all.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("ada/robot.py", b"\0" * 2_000_000)
     with pytest.raises(UsageError, match="unpacks to more than"):
-        read_batch(tmp_path / "all.zip", "echo-responder")
+        read_named_batch(tmp_path / "all.zip", "echo-responder")
 
 
 def test_an_unknown_assignment_is_the_callers_mistake(class_folder: Path) -> None:
     with pytest.raises(UsageError, match="no-such-thing"):
-        read_batch(class_folder, "no-such-thing")
+        read_named_batch(class_folder, "no-such-thing")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from builders import read_named_batch
 from sim.errors import UsageError
-from submissions.batch_folder import read_batch
 
 PROGRAM = "print('hello')\n"
 RESPONDER = "def responder(msg):\n    return msg\n"
@@ -59,7 +59,7 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
         '"O""Neil, Sue",sub\\c,echo-responder',
         "ada,b,json-queue",
     ]
-    checked = read_batch(_roster(folder, "\n".join(rows)), None)
+    checked = read_named_batch(_roster(folder, "\n".join(rows)), None)
     taken = [
         (grading_request.submission.student, grading_request.assignment.id)
         for grading_request in checked.grading_requests
@@ -104,18 +104,18 @@ def test_every_bad_row_is_named_by_its_line_and_the_rest_taken(folder: Path) -> 
     ],
 )
 def test_rosters_of_many_makes_say_the_same(folder: Path, text: str | bytes) -> None:
-    checked = read_batch(_roster(folder, text), "echo-responder")
+    checked = read_named_batch(_roster(folder, text), "echo-responder")
     assert [(row.submission.student, row.source) for row in checked.grading_requests] == [("ada", "a")]
 
 
 def test_a_row_with_an_assignment_of_its_own_keeps_it(folder: Path) -> None:
-    checked = read_batch(_roster(folder, "student,file,assignment\nada,a,json-queue\nbob,b,\n"), "echo-responder")
+    checked = read_named_batch(_roster(folder, "student,file,assignment\nada,a,json-queue\nbob,b,\n"), "echo-responder")
     assert [row.assignment.id for row in checked.grading_requests] == ["json-queue", "echo-responder"]
 
 
 def test_an_open_quotation_mark_costs_one_row(folder: Path) -> None:
     text = 'student,file\nada,a\n"bob,b\neve,b\nmia,"d, e.zip"\n'
-    checked = read_batch(_roster(folder, text), "echo-responder")
+    checked = read_named_batch(_roster(folder, text), "echo-responder")
     assert [row.submission.student for row in checked.grading_requests] == ["ada", "eve", "mia"]
     assert [each.source for each in checked.refusals] == ["line 3"]
 
@@ -134,5 +134,5 @@ def test_an_open_quotation_mark_costs_one_row(folder: Path) -> None:
 )
 def test_what_is_no_roster_is_refused_in_one_sentence(folder: Path, text: str | bytes, expected: str) -> None:
     with pytest.raises(UsageError, match=expected) as caught:
-        read_batch(_roster(folder, text), "echo-responder")
+        read_named_batch(_roster(folder, text), "echo-responder")
     assert "\n" not in str(caught.value)

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from builders import read_named_batch
 from sim.errors import UsageError
-from submissions.batch_folder import BatchContents, read_batch
+from submissions.batch_folder import BatchContents
 from submissions.downloads import parse_moodle_number
 from submissions.student_identity import People, read_people
 from zips import zipped
@@ -81,13 +82,13 @@ def test_moodles_download_names_each_student_once(tmp_path: Path, shape: str, as
     if as_zip:
         path = tmp_path / "download.zip"
         path.write_bytes(zipped(MOODLE[shape]))
-    contents = read_batch(path, ASSIGNMENT)
+    contents = read_named_batch(path, ASSIGNMENT)
     assert refused(contents) == {}
     assert taken(contents) == {name: name for name in ("Ada Lovelace", "Alan Turing", "Mary-Ann O'Neil")}
     numbers = sorted(parse_moodle_number(request.source) for request in contents.grading_requests)
     assert numbers == ["500000", "500001", "500002"]
     assert all(request.submission.responder is not None for request in contents.grading_requests)
-    known = read_batch(path, ASSIGNMENT, people(tmp_path))
+    known = read_named_batch(path, ASSIGNMENT, people(tmp_path))
     assert taken(known) == {"s1": "Ada Lovelace", "s2": "Alan Turing", "s3": "Mary-Ann O'Neil"}
     assert "ada@uni.example" in {request.student.email for request in known.grading_requests}
 
@@ -96,20 +97,20 @@ def test_two_of_one_name_have_their_numbers_beside_it(tmp_path: Path) -> None:
     names = ("Ada Lovelace_500000", "Ada Lovelace_500003", "Alan Turing_500001")
     files = {key: value for name in names for key, value in under(f"{name}_assignsubmission_file_/").items()}
     path = laid(tmp_path / "download", files)
-    assert taken(read_batch(path, ASSIGNMENT)) == {
+    assert taken(read_named_batch(path, ASSIGNMENT)) == {
         "Ada Lovelace (500000)": "Ada Lovelace",
         "Ada Lovelace (500003)": "Ada Lovelace",
         "Alan Turing": "Alan Turing",
     }
-    assert list(taken(read_batch(path, ASSIGNMENT, people(tmp_path)))) == ["s1", "s4", "s2"]
+    assert list(taken(read_named_batch(path, ASSIGNMENT, people(tmp_path)))) == ["s1", "s4", "s2"]
 
 
 def test_blind_marking_knows_numbers_alone(tmp_path: Path) -> None:
     names = ("Participant_500000", "Participant_500001")
     files = {key: value for name in names for key, value in under(f"{name}_assignsubmission_file_/").items()}
     path = laid(tmp_path / "download", files)
-    assert taken(read_batch(path, ASSIGNMENT)) == {"Participant 500000": "", "Participant 500001": ""}
-    assert list(taken(read_batch(path, ASSIGNMENT, people(tmp_path)))) == ["s1", "s2"]
+    assert taken(read_named_batch(path, ASSIGNMENT)) == {"Participant 500000": "", "Participant 500001": ""}
+    assert list(taken(read_named_batch(path, ASSIGNMENT, people(tmp_path)))) == ["s1", "s2"]
 
 
 def test_nobody_is_taken_for_another(tmp_path: Path) -> None:
@@ -119,7 +120,7 @@ def test_nobody_is_taken_for_another(tmp_path: Path) -> None:
         **under("Alan Turin_8_assignsubmission_file_/"),
         "Eve Adams_7_assignsubmission_onlinetext/onlinetext.html": "<p>print('hello')</p>",
     }
-    contents = read_batch(laid(tmp_path / "download", files), ASSIGNMENT, people(tmp_path))
+    contents = read_named_batch(laid(tmp_path / "download", files), ASSIGNMENT, people(tmp_path))
     assert taken(contents) == {}
     reasons = refused(contents)
     assert "has Ada Lovelace as Participant 500000, not Alan Turing" in reasons["Alan Turing"]
@@ -131,7 +132,7 @@ def test_nobody_is_taken_for_another(tmp_path: Path) -> None:
 def test_the_lone_student_of_a_zip_keeps_the_name(tmp_path: Path) -> None:
     path = tmp_path / "download.zip"
     path.write_bytes(zipped(under("Ada Lovelace_500000_assignsubmission_file_/", {"work.zip": zipped(BOTH)})))
-    assert taken(read_batch(path, ASSIGNMENT)) == {"Ada Lovelace": "Ada Lovelace"}
+    assert taken(read_named_batch(path, ASSIGNMENT)) == {"Ada Lovelace": "Ada Lovelace"}
 
 
 GRADESCOPE = """\
@@ -173,7 +174,7 @@ def test_gradescopes_export_goes_by_its_list(tmp_path: Path) -> None:
         **under("submission_90001/"),
         **under("submission_90003/"),
     }
-    contents = read_batch(laid(tmp_path / "export", files), ASSIGNMENT)
+    contents = read_named_batch(laid(tmp_path / "export", files), ASSIGNMENT)
     assert taken(contents) == {"s1": "Ada Lovelace", "alan@uni.example": "Alan Turing", "007": "Grace Hopper"}
     assert [request.source for request in contents.grading_requests] == ["submission_90000"] * 2 + ["submission_90001"]
     when = {str(request.submitted_at) for request in contents.grading_requests}
@@ -203,7 +204,7 @@ MERGES = "m0: &m0 {k: v}\n" + "".join(f"m{n}: &m{n} {{<<: [*m{n - 1}, *m{n - 1}]
 def test_what_is_no_list_of_gradescopes_is_refused_in_one_sentence(tmp_path: Path, text: str, expected: str) -> None:
     folder = laid(tmp_path / "export", {"submission_metadata.yml": text, **under("submission_1/")})
     with pytest.raises(UsageError, match=expected) as caught:
-        read_batch(folder, ASSIGNMENT)
+        read_named_batch(folder, ASSIGNMENT)
     assert "\n" not in str(caught.value)
 
 
@@ -211,7 +212,7 @@ def test_what_is_no_list_of_gradescopes_is_refused_in_one_sentence(tmp_path: Pat
 def test_a_list_that_would_grow_or_act_does_neither(tmp_path: Path, text: str) -> None:
     folder = laid(tmp_path / "export", {"submission_metadata.yml": text, **under("submission_1/")})
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    contents = read_batch(folder, ASSIGNMENT)
+    contents = read_named_batch(folder, ASSIGNMENT)
     assert contents.grading_requests == ()
     assert "submission_1" in {refusal.source for refusal in contents.refusals}
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000
@@ -226,22 +227,22 @@ def test_nbgraders_folder_goes_by_student_and_assignment(tmp_path: Path) -> None
         **under("submitted/s3/no-such-thing/"),
     }
     folder = laid(tmp_path, files) / "submitted"
-    each = read_batch(folder, None)
+    each = read_named_batch(folder, None)
     found = {(request.submission.student, request.assignment.id) for request in each.grading_requests}
     assert found == {("s1", "echo-responder"), ("s2", "echo-responder"), ("s1", "json-queue")}
     assert list(refused(each)) == ["s3"]
-    first, second = read_batch(folder, ASSIGNMENT).grading_requests
+    first, second = read_named_batch(folder, ASSIGNMENT).grading_requests
     assert (str(first.submitted_at), second.submitted_at) == ("2026-11-19 16:03:18+00:00", None)
     # The time of submission is not part of the submission.
     assert first.submission.sha256 == second.submission.sha256
     with pytest.raises(UsageError, match=r"has submissions for .*, expected for rule-set"):
-        read_batch(folder, "rule-set")
+        read_named_batch(folder, "rule-set")
 
 
 def test_a_roster_says_who_everybody_is_in_any_order(tmp_path: Path) -> None:
     folder = laid(tmp_path, {**under("a/"), **under("b/")})
     (folder / "roster.csv").write_text("Email;file;NAME;id\nada@uni.example;a;Ada Lovelace;s1\n;b;;s2\n")
-    contents = read_batch(folder / "roster.csv", ASSIGNMENT)
+    contents = read_named_batch(folder / "roster.csv", ASSIGNMENT)
     told = [(each.student.id, each.student.name, each.student.email) for each in contents.grading_requests]
     assert told == [("s1", "Ada Lovelace", "ada@uni.example"), ("s2", "", "")]
 

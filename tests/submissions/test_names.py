@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from sqlalchemy import insert, select, update
 
-from builders import grading_request
+from builders import grading_request, read_named_batch
 from command import robomark
 from service.reports.output_files import build_file_stem, build_file_stems, build_refused_stems
 from service.store.batches import intake
@@ -22,7 +22,7 @@ from service.store.states import Role
 from service.store.tables.people import Enrolment, Person
 from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
-from submissions.batch_folder import BatchContents, read_batch
+from submissions.batch_folder import BatchContents
 from submissions.bundle import read_submission
 from submissions.student_identity import Student
 from submissions.student_names import compute_name_forms, find_look_alikes, normalise_name
@@ -112,7 +112,7 @@ def _refused(checked: BatchContents) -> list[str]:
 def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
     tmp_path: Path, batch: Callable[..., Path], ada: str, eve: str
 ) -> None:
-    checked = read_batch(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
+    checked = read_named_batch(batch(tmp_path, ada, "bob the third", eve), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob the third"]
     assert len(_refused(checked)) == 2
     assert all("cannot be distinguished from" in each or "too, and not the same" in each for each in _refused(checked))
@@ -121,7 +121,9 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
 @PAIRS
 def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: Store, ada: str, eve: str) -> None:
     """Refused in a later batch, except spellings that normalise to the same name."""
-    batches = [read_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))]
+    batches = [
+        read_named_batch(_folder(tmp_path / str(number), name), ASSIGNMENT) for number, name in enumerate((ada, eve))
+    ]
     first, later = (
         intake.accept_new_submissions(store, "b", each.grading_requests, each.refusals, max_attempts=3)
         for each in batches
@@ -159,7 +161,7 @@ def test_files_of_alike_names_never_share_a_name(ada: str, eve: str) -> None:
 )
 def test_students_of_different_names_are_all_taken_in(tmp_path: Path, names: tuple[str, ...]) -> None:
     assert find_look_alikes(names) == {}
-    checked = read_batch(_folder(tmp_path, *names), ASSIGNMENT)
+    checked = read_named_batch(_folder(tmp_path, *names), ASSIGNMENT)
     assert {each.submission.student for each in checked.grading_requests} == set(names)
     assert checked.refusals == ()
 
@@ -169,7 +171,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
     with zipfile.ZipFile(folder / "ada.zip", "w") as archive:
         archive.writestr("robot.py", "print('not hers')\n")
         archive.writestr("responder.py", RESPONDER)
-    checked = read_batch(folder, ASSIGNMENT)
+    checked = read_named_batch(folder, ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["bob"]
     assert [each.source for each in checked.refusals] == ["ada", "ada.zip"]
     assert all("not the same; expected one" in sentence for sentence in _refused(checked))
@@ -177,7 +179,7 @@ def test_of_one_students_several_in_a_batch_none_is_chosen_where_they_differ(tmp
 
 @pytest.mark.parametrize("name", ["\u200b", "\u3164", "x" * 101])
 def test_a_folder_that_names_nobody_is_refused(tmp_path: Path, name: str) -> None:
-    checked = read_batch(_folder(tmp_path, "ada", name), ASSIGNMENT)
+    checked = read_named_batch(_folder(tmp_path, "ada", name), ASSIGNMENT)
     assert [each.submission.student for each in checked.grading_requests] == ["ada"]
     (sentence,) = _refused(checked)
     assert f"a student's name of {len(normalise_name(name))} characters" in sentence
@@ -191,7 +193,7 @@ def test_a_submission_does_not_say_whose_it_is(tmp_path: Path, named: str) -> No
     assert "submission.toml names the student" in submission.notes[0]
     roster = tmp_path / "roster.csv"
     roster.write_text("student,file\nmallory,eve\n")
-    (taken,) = read_batch(roster, ASSIGNMENT).grading_requests
+    (taken,) = read_named_batch(roster, ASSIGNMENT).grading_requests
     assert taken.submission.student == "mallory"
 
 

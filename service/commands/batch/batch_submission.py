@@ -27,7 +27,7 @@ from service.operations.types import JobState
 from sim.errors import Cancelled, HostError, UsageError
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_assignment
-from submissions.batch_folder import read_batch_for
+from submissions.batch_folder import read_batch
 from submissions.student_identity import RejectedSubmission, read_people
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _queue_submissions(service: Service, actor: Actor, request: BatchToSubmit) -
     """Queue the readable submissions and report how many are new."""
     course_id = operations.resolve_course(service, actor, request.course)
     assignment = _resolve_assignment(service, actor, course_id, request.assignment)
-    batch_contents = read_batch_for(
+    batch_contents = read_batch(
         request.path, assignment, None if request.people is None else read_people(request.people)
     )
     _show_refusals(batch_contents.refusals)

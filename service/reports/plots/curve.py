@@ -63,8 +63,8 @@ class AccuracyPanel:
     level: float | None = None
 
 
-def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "", unit: str = "images") -> Drawing:
-    """Draw the panels below each other, all with an axis from 0 to 1. ``unit`` is the unit of ``n``."""
+def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "") -> Drawing:
+    """Draw the panels below each other, all with an axis from 0 to 1."""
     row = _ABOVE + _PANEL + _BELOW
     height = HEAD + row * len(panels) + _FOOT
     drawing = create_drawing(height, title, subtitle)
@@ -72,7 +72,7 @@ def draw_curves(panels: Sequence[AccuracyPanel], title: str, subtitle: str = "",
         top = height - HEAD - row * number
         drawing.add_text(0.08, top - 0.14, to_one_line(panel.varied, 40), size=9, bold=True, vertical="center")
         drawing.add_text(
-            WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves, unit), size=8, colour=FAINT,
+            WIDTH - _RIGHT_MARGIN, top - 0.14, _format_counts(panel.curves), size=8, colour=FAINT,
             horizontal="right", vertical="center",
         )  # fmt: skip
         place = Rectangle(_LEFT, top - _ABOVE - _PANEL, WIDTH - _LEFT - _RIGHT_MARGIN, _PANEL)
@@ -152,12 +152,12 @@ def _draw_legend(panel: Panel, curves: Sequence[Curve]) -> None:
         y -= _LEGEND_LINE * line_count
 
 
-def _format_counts(curves: Sequence[Curve], unit: str) -> str:
+def _format_counts(curves: Sequence[Curve]) -> str:
     counts = {count for curve in curves for count in curve.n}
     if not counts:
         return "n = 0"
     minimum, maximum = min(counts), max(counts)
-    return f"n = {minimum if minimum == maximum else f'{minimum} to {maximum}'} {unit} per point"
+    return f"n = {minimum if minimum == maximum else f'{minimum} to {maximum}'} images per point"
 
 
 def _select_ticks(xs: Sequence[float]) -> list[float]:

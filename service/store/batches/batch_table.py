@@ -1,6 +1,6 @@
 """Table of a batch: a short row for each submission and rejection, filtered, sorted and split into pages.
 
-Read-only. Reads only the columns that a row shows; ``batches.py`` reads everything about one job.
+Read-only. Reads only the columns that a row shows; ``job_lines.py`` reads everything about one job.
 """
 
 from __future__ import annotations

@@ -38,13 +38,6 @@ class AttemptStatus(JobStatus, Protocol):
     def staff_only(self) -> str | None: ...  # noqa: D102
 
 
-class StandingStatus(AttemptStatus, Protocol):
-    """Fields of ``AttemptStatus``, with the standing of the job."""
-
-    @property
-    def standing(self) -> Standing: ...  # noqa: D102
-
-
 def is_trusted(job: JobStatus) -> bool:
     """Return whether ``IS_TRUSTED`` applies."""
     return job.state == JobState.DONE and job.suspect is None
@@ -53,11 +46,6 @@ def is_trusted(job: JobStatus) -> bool:
 def is_for_students(attempt: AttemptStatus) -> bool:
     """Return whether ``IS_FOR_STUDENTS`` applies."""
     return is_trusted(attempt) and attempt.staff_only is None
-
-
-def can_count(attempt: StandingStatus) -> bool:
-    """Return whether ``CAN_COUNT`` applies."""
-    return is_for_students(attempt) and attempt.standing is Standing.STANDS
 
 
 def select_counted_submissions(*conditions: ColumnElement[bool]) -> Select[int]:

@@ -17,7 +17,7 @@ from sqlalchemy import func, select
 import acting
 from benchmarks.harness.postgresql_server import create_database
 from benchmarks.harness.process_tree import find_children, find_descendants, read_command_line
-from builders import comparable, grading_request, settings_in
+from builders import comparable, grading_request, read_named_batch, settings_in
 from processes import PATIENCE, until
 from service.commands.batch.batch_waiter import BatchWaiter
 from service.grading.grader import grade
@@ -39,7 +39,6 @@ from service.store.states import JobQueue, JobState, PlotState
 from service.store.tables.grades import CriterionResultRow, TrialRow
 from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
-from submissions.batch_folder import read_batch
 from submissions.grading_request import GradingRequest
 
 #: Uses its whole limit of processor time, so that something can be killed while it runs.
@@ -112,7 +111,7 @@ def _spinning(count: int) -> list[GradingRequest]:
 
 
 def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
-    checked = read_batch(locate_examples("echo-responder"), "echo-responder")
+    checked = read_named_batch(locate_examples("echo-responder"), "echo-responder")
     assert checked.refusals == ()
     batch = service.submit(list(checked.grading_requests))
     graded = service.wait(batch)
@@ -184,7 +183,7 @@ def test_a_batch_on_postgresql(tmp_path: Path, postgresql: str) -> None:
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:
         service = Service(settings, store, services)
         batch = service.submit(
-            [*read_batch(locate_examples("json-queue"), "json-queue").grading_requests, *_spinning(1)]
+            [*read_named_batch(locate_examples("json-queue"), "json-queue").grading_requests, *_spinning(1)]
         )
         service.until_running(batch)
         assert services.worker_pid is not None

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from builders import read_named_batch
 from service.web.temporary_files import own_temporary_folder
 from sim.errors import UsageError
-from submissions.batch_folder import read_batch
 from web import Web
 from zips import zipped
 
@@ -85,7 +85,7 @@ def test_a_batch_unpacks_to_so_many_times_its_size_and_no_more(tmp_path: Path) -
             archive.writestr(f"s{number}.py", "#" * 4_000_000)
     assert path.stat().st_size < 200_000
     with pytest.raises(UsageError, match="unpacks to more than"):
-        read_batch(path, "echo-responder")
+        read_named_batch(path, "echo-responder")
 
 
 def test_one_batch_is_unpacked_at_a_time(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
