@@ -139,13 +139,15 @@ def _read_text(table: object, key: str) -> str:
 def _parse_time(value: object) -> datetime | None:
     """Parse a Ruby timestamp, which is inside a table if it has a zone; None if it cannot be read."""
     text = _read_text(value, "utc") if isinstance(value, dict) else value
-    match = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", str(text))
+    if not isinstance(text, str):
+        return None
+    match = re.match(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|UTC|[+-]\d\d:?\d\d)?", text)
     if match is None:
         return None
     zone = match[4] if match[4] and match[4][0] in "+-" else "+00:00"
     try:
         return datetime.fromisoformat(f"{match[1]}T{match[2]}{zone}").astimezone(UTC)
-    except ValueError:
+    except (ValueError, OverflowError):
         return None
 
 

@@ -6,7 +6,7 @@ Files are located inside the roster's folder only; ``batch_folder.py`` reads the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path, PurePosixPath
 
 from sim.errors import UsageError
@@ -92,9 +92,13 @@ def parse_time(text: str, *, end_of_day: bool = False) -> datetime:
         ValueError: The text is not a date or time.
     """
     moment = datetime.fromisoformat(text)
-    if end_of_day and len(text.strip()) <= len("2026-11-30"):
-        moment += timedelta(days=1, microseconds=-1)
-    return moment.astimezone()
+    try:
+        if end_of_day and len(text.strip()) <= len("2026-11-30"):
+            moment += timedelta(days=1, microseconds=-1)
+        # Stored times are in UTC, so that must be possible too.
+        return moment.astimezone(UTC).astimezone()
+    except OverflowError:
+        raise ValueError(f"{text!r} is too early or too late") from None
 
 
 def _find_problem(student: str, file: str) -> str:

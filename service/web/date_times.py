@@ -21,7 +21,7 @@ def parse_date_time(text: str) -> datetime | None:
         return None
     try:
         parsed_time = parse_time(text, end_of_day=True)
-    except (ValueError, OverflowError):
+    except ValueError:
         parsed_time = None
     if parsed_time is None or not 2000 <= parsed_time.year < 2200:
         raise UsageError(f"{text[:40]!r} is not a date, expected a date like 2026-11-30 or 2026-11-30T17:00")

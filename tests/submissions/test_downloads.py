@@ -218,6 +218,23 @@ def test_a_list_that_would_grow_or_act_does_neither(tmp_path: Path, text: str) -
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000
 
 
+def test_a_time_that_is_no_text_is_not_written_out(tmp_path: Path) -> None:
+    text = f"{BOMB}submission_1:\n  :submitters:\n  - :name: Ada\n  :created_at: *a39\n"
+    folder = laid(tmp_path / "export", {"submission_metadata.yml": text, **under("submission_1/")})
+    (request,) = read_batch(folder, ASSIGNMENT).grading_requests
+    assert request.submitted_at is None
+
+
+@pytest.mark.parametrize("time", ["0001-01-01 00:00:00 +05:00", "9999-12-31 23:59:59 -05:00"])
+def test_a_student_with_an_impossible_time_keeps_nobody_out(tmp_path: Path, time: str) -> None:
+    files = {
+        **under("submitted/s1/echo-responder/", {**BOTH, "timestamp.txt": time}),
+        **under("submitted/s2/echo-responder/"),
+    }
+    contents = read_batch(laid(tmp_path, files) / "submitted", ASSIGNMENT)
+    assert [request.submitted_at for request in contents.grading_requests] == [None, None]
+
+
 def test_nbgraders_folder_goes_by_student_and_assignment(tmp_path: Path) -> None:
     stamp = {"timestamp.txt": "2026-11-19 16:03:18.948203 UTC"}
     files = {
