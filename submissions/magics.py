@@ -19,6 +19,8 @@ from submissions.suggestions import suggest_name
 
 _MAX_X, _MAX_Y, _MAX_ANGLE = 2362, 1143, 360
 _MAX_LIGHT_NOISE, _MAX_MOTOR_NOISE = 128, 500
+#: The longest line of flags, in characters. Splitting it takes time.
+_MAX_ARGUMENTS_LENGTH = 2000
 _PEN_COLOURS = ("red", "orange", "green")
 
 #: Pose of the robot in a new simulator, and after a robot is chosen.
@@ -160,6 +162,8 @@ def parse_flags(name: str, arguments: str) -> Flags:
 
 
 def _split_arguments(name: str, arguments: str) -> list[str]:
+    if len(arguments) > _MAX_ARGUMENTS_LENGTH:
+        raise UsageError(f"the flags of %%{name} are longer than {_MAX_ARGUMENTS_LENGTH} characters")
     try:
         return shlex.split(arguments, comments=False)
     except ValueError as error:

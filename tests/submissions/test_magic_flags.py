@@ -125,6 +125,7 @@ def test_single_letters_stand_together_and_the_rest_is_read() -> None:
         "%%sim_magic_preloaded -F",
         "%%sim_magic_imports -m",
         "%%sim_magic --previewcode",
+        "%%sim_magic " + 1000 * "-h ",
     ],
 )
 def test_a_line_that_cannot_be_read_is_refused_in_one_sentence(line: str) -> None:
