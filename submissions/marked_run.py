@@ -20,6 +20,7 @@ from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.magics import comment_out_magic, parse_flags, parse_magic
 from submissions.notebook import describe_near_program
+from submissions.raw_files import sanitise_name
 from submissions.source_text import find_magic_line, is_program_magic
 from submissions.submission import Cell, Notebook
 
@@ -37,6 +38,7 @@ _SENDS = ("PY::", "IMG_DATA")
 #: Maximum number of statements and characters of a sensor test.
 _TEST_STATEMENTS, _TEST_LENGTH = 2, 300
 _MAX_LISTED_RUNS = 5
+_MAX_RUN_DIGITS = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,14 +164,16 @@ def find_run(notebook: Notebook, selector: str, requested_run: str | None = None
 def _find_requested_run(notebook: Notebook, runs: Sequence[ProgramRun], requested_run: str) -> ProgramRun:
     if not requested_run.isdecimal():
         return _find_tagged_run(notebook, runs, requested_run.removeprefix(_TAG))
-    if not 1 <= int(requested_run) <= len(runs):
+    # Python rejects integers with thousands of digits.
+    number = int(requested_run) if len(requested_run) <= _MAX_RUN_DIGITS else 0
+    if not 1 <= number <= len(runs):
         raise UsageError(
             "%(name)s: has no run %(asked)s, expected a number from 1 to %(most)s, or a tag.",
             name=notebook.name,
-            asked=requested_run,
+            asked=sanitise_name(requested_run),
             most=len(runs),
         )
-    return runs[int(requested_run) - 1]
+    return runs[number - 1]
 
 
 def _find_tagged_run(notebook: Notebook, runs: Sequence[ProgramRun], tag: str) -> ProgramRun:
@@ -179,7 +183,7 @@ def _find_tagged_run(notebook: Notebook, runs: Sequence[ProgramRun], tag: str) -
             '%(name)s: has no cell with the tag "%(tag)s", expected it on the cell with the robot program; '
             "it is lost when a notebook is saved as .py.",
             name=notebook.name,
-            tag=tag,
+            tag=sanitise_name(tag),
         )
     tagged_runs = [run for run in runs if run.site.cell in tagged_cells]
     if not tagged_runs:

@@ -82,6 +82,13 @@ def build_actor(identity: Identity) -> Actor:
     )
 
 
+def find_course_role(identity: Identity, course: str) -> Role | None:
+    """Return the role in the course with this id, as written in a path; None without one, or for any other text."""
+    # Python rejects integers with thousands of digits.
+    is_number = course.isdecimal() and len(course) <= len(str(HIGHEST_NUMBER))
+    return identity.roles.get(int(course)) if is_number else None
+
+
 def derive_csrf_token(session_secret: str) -> str:
     """Return the CSRF token for a session. It does not reveal the session's secret."""
     return _derive_key(session_secret, b"robomark csrf").hex()

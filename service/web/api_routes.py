@@ -26,6 +26,7 @@ from service.operations import replies
 from service.operations.database_errors import DatabaseError
 from service.operations.replies import InProgress, StoredReply
 from service.operations.sign_in import Identity
+from service.web.access import find_course_role
 from service.web.api_access import require_caller
 from service.web.compression import compress_response
 from service.web.context import WebContext
@@ -180,8 +181,7 @@ async def _run_once(request: Request, key: str, handle_request: Callable[[Reques
 
 def _format_role_key(request: Request, identity: Identity) -> str:
     """Return the caller's role in the path's course, and ``operator`` for operators, as part of the key."""
-    course = str(request.path_params.get("course_id", ""))
-    role = identity.roles.get(int(course)) if course.isdecimal() and len(course) < 20 else None
+    role = find_course_role(identity, str(request.path_params.get("course_id", "")))
     return f"{role or ''}{' operator' if identity.operator else ''}"
 
 

@@ -23,7 +23,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.operations import sign_in
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
-from service.web.access import SESSION_COOKIE, SignInNeeded, build_not_found
+from service.web.access import SESSION_COOKIE, SignInNeeded, build_not_found, find_course_role
 from service.web.context import WebContext
 from service.web.http_errors import TranslatableHTTPException
 from service.web.problems import API_PREFIX
@@ -122,7 +122,7 @@ def _check_sender(request: Request, upload: UploadLimit | None, course: str) -> 
     identity = _find_identity(request)
     if identity is None:
         raise SignInNeeded("sign in first")
-    if upload is not None and not (course.isdecimal() and identity.roles.get(int(course)) is upload.role):
+    if upload is not None and find_course_role(identity, course) is not upload.role:
         raise build_not_found()
 
 

@@ -111,6 +111,9 @@ def sanitize_target(target: str) -> str:
 
     Rejects backslashes and control characters, which browsers normalise.
     """
-    parts = urlsplit(target)
+    try:
+        parts = urlsplit(target)
+    except ValueError:
+        return "/"
     is_ours = target.startswith("/") and not target.startswith("//") and not parts.netloc and not parts.scheme
     return target if is_ours and "\\" not in target and target.isprintable() else "/"

@@ -62,7 +62,16 @@ def test_a_session_is_new_at_each_sign_in_and_ends_with_its_leave(web: Web) -> N
 
 @pytest.mark.parametrize(
     "target",
-    ["//evil.example.org", "https://evil.example.org", "/\\evil.example.org", "javascript:alert(1)", "/a\r\nb: c", "x"],
+    [
+        "//evil.example.org",
+        "https://evil.example.org",
+        "/\\evil.example.org",
+        "javascript:alert(1)",
+        "/a\r\nb: c",
+        "x",
+        "//[",
+        "//\u2100.example.org",
+    ],
 )
 def test_signing_in_leads_nowhere_but_here(web: Web, target: str) -> None:
     answer = web.browser().post("/sign-in", data={"secret": web.link(web.student()), "next": target})
