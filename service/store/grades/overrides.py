@@ -96,7 +96,12 @@ def set_marks(
             marks=marks,
             worth=f"{line.worth:f}",
         )
-    _replace_override(session, submission_id, line, abs(marks), reason, actor)
+    _replace_override(session, submission_id, line, _remove_padding(marks), reason, actor)
+
+
+def _remove_padding(marks: Decimal) -> Decimal:
+    """Return marks without sign, exponent and trailing zeros: written out, 0E-400000000 would take 400 MB."""
+    return Decimal(f"{abs(marks.quantize(_FINEST_MARKS)).normalize():f}")
 
 
 def excuse_criterion(

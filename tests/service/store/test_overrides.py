@@ -267,6 +267,18 @@ def test_marks_are_read_as_people_write_them(text: str, marks: str) -> None:
     assert overrides.parse_marks(text) == Decimal(marks)
 
 
+@pytest.mark.parametrize(
+    ("written", "stored"),
+    [("0E-400000000", "0"), ("2." + "0" * 9000, "2"), ("2.5000", "2.5"), ("-0", "0"), ("1e0", "1")],
+)
+def test_marks_are_stored_without_padding(store: Store, written: str, stored: str) -> None:
+    _, job_id = _graded(store)
+    _change(store, job_id, _set(SHAPE, written))
+    with store.reading() as session:
+        override = overrides.load_overrides(session, [job_id])[job_id][SHAPE]
+    assert str(override.marks) == stored
+
+
 def test_a_grade_that_waits_has_no_marks_to_be_set(store: Store) -> None:
     job_id = accept_one(store).job_id
     with pytest.raises(UsageError, match="has no grade"):
