@@ -330,6 +330,8 @@ class Bridge:
         sides = message_format.parse_logged_sides(text)
         side_name = text.split(" ")[1] if " " in text else "undefined"
         self.printed.append(TimedText(self.now / SECOND, f"{side_name} image data logged..."))
+        if not sides:
+            return  # Rendering takes time that is not charged.
         images = dict(zip(("left", "right"), self.world.render_images(), strict=True))
         for side in sides:
             self._charge_output(len(images[side]), "logged images of")

@@ -7,6 +7,7 @@ import pytest
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from sim.recording import Pose, Verdict
+from sim.world import World
 
 pytestmark = pytest.mark.fast
 
@@ -171,6 +172,13 @@ def test_the_datalog_is_read_from_what_is_printed(runner: TrialRunner) -> None:
         ("right", 1600, 0),
     ]
     assert recording.printed[-1].text == "both image data logged..."
+
+
+def test_no_image_is_rendered_unless_it_is_logged(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(World, "render_images", lambda _: pytest.fail("an image was rendered"))
+    recording = run_program(runner, "for _ in range(3):\n    print('image_data none')\n")
+    assert [line.text for line in recording.printed] == ["none image data logged..."] * 3
+    assert (recording.image_log, recording.faults) == ((), ())
 
 
 def test_touching_a_wall_and_an_obstacle_is_recorded_and_stops_nothing(runner: TrialRunner) -> None:
