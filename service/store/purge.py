@@ -165,7 +165,11 @@ def _mark_old_submissions(session: Session, cutoff: datetime, course_id: int | N
     # The source of a kept copy may be a copy itself.
     while session.execute(delete(_MARKED_SUBMISSIONS).where(_MARKED_SUBMISSIONS.c.id.in_(needed_ids))).rowcount:  # type: ignore[attr-defined]
         pass
-    losing_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.in_(_marked_submission_ids))
+    losing_enrolments = (
+        select(SubmissionRow.enrolment_id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .where(SubmissionRow.id.in_(_marked_submission_ids), Enrolment.role == Role.STUDENT)
+    )
     keeping_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_marked_submission_ids))
     session.execute(insert(_MARKED_ENROLMENTS).from_select(["id"], losing_enrolments.except_(keeping_enrolments)))
 

@@ -187,6 +187,16 @@ def test_who_is_being_graded_or_instructs_is_not_erased(store: Store) -> None:
         _erase(store, 1)
 
 
+def test_an_instructor_stays_when_their_old_submissions_go(store: Store) -> None:
+    submit(store, Student("ada"), Student("bob"))
+    with store.transaction() as session:
+        session.scalars(select(Enrolment).where(Enrolment.student == "ada")).one().role = Role.INSTRUCTOR
+    gone = purge_submissions(store, datetime.now(UTC) + timedelta(days=1), "grace")
+    assert (gone.submissions, gone.students) == (2, 1)
+    with store.reading() as session:
+        assert session.scalars(select(Enrolment.student)).all() == ["ada"]
+
+
 def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
     everything(store)
     gone = purge_submissions(store, datetime.now(UTC) + timedelta(days=1), "grace", course_id=2)
