@@ -133,9 +133,8 @@ def _assemble_submission(raw: RawFiles, source_name: str, name: str, candidate: 
     student = normalise_name(name)[:MAX_NAME_LENGTH].strip() or UNNAMED
     meta_student = normalise_name(get_meta_text(meta, "student", source_name) or student)
     if meta_student != student:
-        notes.append(
-            f"{META_FILE} names the student {sanitise_name(meta_student)}, but the student is {sanitise_name(student)}."
-        )
+        # Notes are shown with hidden names too, so they do not name the student.
+        notes.append(f"{META_FILE} names the student {sanitise_name(meta_student)}, which is not used.")
     run = get_meta_run(meta, source_name)
     if run is not None and notebook is None:
         notes.append(f"{META_FILE} says run = {normalise_name(run)}, which is not used: there is no notebook.")
@@ -184,8 +183,8 @@ def _find_notebook(files: dict[str, bytes], source_name: str, notes: list[str]) 
         )
         if not parts:
             raise UsageError(sentence) from None
-        # The .py file beside it may contain the requested parts.
-        notes.append(str(sentence))
+        # The .py file beside it may contain the requested parts. Names of downloads can contain the student's.
+        notes.append(str(sentence).removeprefix(f"{source_name}: "))
         for name in names:
             del files[name]
         return None

@@ -150,12 +150,19 @@ def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:
     assert fitted.notes == ("robot.py was left out: the assignment does not need a robot program.",)
 
 
+def test_a_note_does_not_name_the_students_folder(tmp_path: Path) -> None:
+    path = folder(tmp_path / "Ada Lovelace_500000", {**BOTH, "notes.ipynb": "{"})
+    (path / "responder.py").unlink()
+    (note,) = read_submission(path).notes
+    assert note.startswith("notes.ipynb: is not a notebook")
+
+
 def test_submission_toml_names_the_assignment_and_not_the_student(tmp_path: Path) -> None:
     meta = 'assignment = "echo-responder"\nstudent = "Zoë\\u0007 Q"\n'
     path = folder(tmp_path / "json-queue" / "h1", {**BOTH, "submission.toml": meta})
     submission = read_submission(path)
     assert (submission.assignment, submission.student) == ("echo-responder", "h1")
-    assert submission.notes == ("submission.toml names the student Zoë Q, but the student is h1.",)
+    assert submission.notes == ("submission.toml names the student Zoë Q, which is not used.",)
     assert not submission.files
     assert read_submission(path, student="s1").student == "s1"
     (path / "submission.toml").unlink()
