@@ -69,8 +69,8 @@ def format_heading(heading: float) -> str:
 
 def format_decimal(value: Decimal) -> str:
     """Return marks as people write them: ``4``, ``2.5``, never ``4.00`` or ``0E+1``."""
-    digits = f"{value:f}"
-    return digits.rstrip("0").rstrip(".") if "." in digits else digits
+    # Written out, 0E-400000000 has 400 million digits.
+    return f"{value.normalize():f}"
 
 
 def to_json_number(value: Decimal) -> int | float:

@@ -24,6 +24,7 @@ from submissions.criteria.common import (
 from submissions.magics import Flags, parse_flags
 from submissions.strict_table import StrictTable
 
+_MAX_ANSWER_DIGITS = 300
 #: Words that denote a construct. Other entries are names.
 CONSTRUCTS = (
     "for",
@@ -133,6 +134,12 @@ class ExpectedCall(StrictTable):
         return self
 
 
+def _parse_answer(answer: str) -> int | str:
+    """Return a whole number as such, and any other answer as a text."""
+    # Python rejects integers with thousands of digits.
+    return int(answer) if answer.isdecimal() and len(answer) <= _MAX_ANSWER_DIGITS else answer
+
+
 class Functions(Criterion):
     """Functions of the responder return the expected values. They are called without a robot.
 
@@ -178,7 +185,7 @@ class Functions(Criterion):
         except UsageError as error:
             raise UnmetRequirement("table", str(error)) from None
         calls = tuple(
-            ExpectedCall(arguments=tuple(arguments), returns=int(answer) if answer.isdecimal() else answer, hidden=True)
+            ExpectedCall(arguments=tuple(arguments), returns=_parse_answer(answer), hidden=True)
             for answer, *arguments in rows
         )
         return self.model_copy(update={"calls": calls})

@@ -74,6 +74,12 @@ class UnmetRequirement(UsageError):
         self.key, self.sentence = key, sentence
 
 
+def _remove_padding(marks: Decimal) -> Decimal:
+    """Return marks with at most two decimal places, which are all zeros beyond them: 0E-400000000 becomes 0.00."""
+    exponent = marks.as_tuple().exponent
+    return marks if isinstance(exponent, int) and exponent >= -2 else marks.quantize(Decimal("0.01"))
+
+
 class Criterion(StrictTable):
     """Base class of all criteria. ``scenarios`` names the scenarios it applies to; empty means all.
 
@@ -83,7 +89,7 @@ class Criterion(StrictTable):
     id: str = Field(default="", pattern=r"^[a-z0-9][a-z0-9_-]*$|^$", max_length=80)  # defaults to a form of the title
     check: str  # the kind of criterion
     title: str = Field(min_length=1, max_length=200)
-    marks: Decimal = Field(ge=0, le=10000, decimal_places=2)
+    marks: Annotated[Decimal, AfterValidator(_remove_padding)] = Field(ge=0, le=10000, decimal_places=2)
     scenarios: SomeTexts = ()
     robot: Literal[1, 2] = 1  # the robot it applies to, if there are two
     #: how trials are converted to marks

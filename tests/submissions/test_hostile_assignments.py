@@ -15,6 +15,7 @@ from submissions.assignment.definition import Assignment, Parts, Scenario, World
 from submissions.assignment.export import export_for_students
 from submissions.assignment.problems import AssignmentProblems, find_lines
 from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.criteria.code import Functions
 from submissions.sweep import Sweep
 
 _HEAD = 'id = "a"\ntitle = "A"\n'
@@ -78,6 +79,21 @@ def test_it_is_refused_with_little_work(case: str, tmp_path: Path, monkeypatch: 
     assert 0 < len(error.value.problems) <= 102
     assert len(compared) <= 300
     assert max(compared, default=0) <= 100
+
+
+@pytest.mark.parametrize(("marks", "stored"), [("0e-400000000", "0.00"), ("1." + "0" * 9000, "1.00"), ("2.5", "2.5")])
+def test_marks_are_read_without_padding(marks: str, stored: str, tmp_path: Path) -> None:
+    (tmp_path / "assignment.toml").write_text(_HEAD + _scenario("") + _FINISHES.replace("1", f'"{marks}"', 1))
+    assert str(read_assignment(tmp_path).max_marks) == stored
+
+
+def test_an_answer_with_thousands_of_digits_is_a_text(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"answer,x\n{'9' * 5000},1\n7,2\n")
+    functions = '[[criterion]]\ntitle = "F"\nmarks = 1\ncheck = "functions"\nfunction = "f"\ntable = "t.csv"\n'
+    (tmp_path / "assignment.toml").write_text(_HEAD + '[parts]\nprogram = "none"\n' + functions)
+    (criterion,) = read_assignment(tmp_path).criteria
+    assert isinstance(criterion, Functions)
+    assert [call.returns for call in criterion.calls] == ["9" * 5000, 7]
 
 
 _LEVELS = st.lists(st.sampled_from([0.0, 1.0, 2.0]), min_size=1, max_size=3, unique=True).map(tuple)

@@ -47,7 +47,8 @@ def test_a_image_message_is_named_not_listed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("marks", "shown"), [("4.00", "4"), ("2.50", "2.5"), ("0E+1", "0"), ("100", "100"), ("0", "0")]
+    ("marks", "shown"),
+    [("4.00", "4"), ("2.50", "2.5"), ("0E+1", "0"), ("100", "100"), ("0", "0"), ("0E-400000000", "0")],
 )
 def test_marks_as_people_write_them(marks: str, shown: str) -> None:
     assert format_decimal(Decimal(marks)) == shown
