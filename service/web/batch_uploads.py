@@ -9,13 +9,9 @@ from pathlib import Path
 
 from service.operations.batches import find_batch_assignment
 from service.operations.context import Actor
-from service.web.context import WebContext
-from service.web.http_errors import TranslatableHTTPException
-from sim.sentences import Sentence
+from service.web.context import WebContext, hold_slot
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.student_identity import People
-
-_UNPACKING_SECONDS = 30
 
 
 def read_upload(
@@ -37,11 +33,5 @@ def read_upload(
     """
     batch_assignment = find_batch_assignment(context.service, actor, course_id, assignment)
     # One at a time, because an upload may need gigabytes of temporary disk space.
-    if not context.unpacking.acquire(timeout=_UNPACKING_SECONDS):
-        raise TranslatableHTTPException(
-            503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
-        )
-    try:
+    with hold_slot(context.unpacking):
         return read_batch(path, batch_assignment, people)
-    finally:
-        context.unpacking.release()

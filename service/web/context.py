@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from threading import BoundedSemaphore
 from typing import Annotated
 
@@ -10,7 +13,13 @@ from fastapi import Depends, Request
 
 from service.operations.context import Service
 from service.settings import Settings
+from service.web.http_errors import TranslatableHTTPException
 from service.web.rate_limits import RateLimits
+from sim.sentences import Sentence
+
+_SLOT_SECONDS = 30
+#: Reading one submission can take hundreds of megabytes.
+_MAX_SUBMISSIONS_READ = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,11 +30,26 @@ class WebContext:
     limits: RateLimits
     #: Held while a batch is unpacked, so that only one is unpacked at a time.
     unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
+    #: Held while files of a student are read.
+    reading: BoundedSemaphore = field(default_factory=partial(BoundedSemaphore, _MAX_SUBMISSIONS_READ))
 
     @property
     def settings(self) -> Settings:
         """Return the settings of the service."""
         return self.service.settings
+
+
+@contextmanager
+def hold_slot(slots: BoundedSemaphore) -> Iterator[None]:
+    """Hold one of the slots within a ``with`` block. Raises HTTPException 503 if none becomes free."""
+    if not slots.acquire(timeout=_SLOT_SECONDS):
+        raise TranslatableHTTPException(
+            503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
+        )
+    try:
+        yield
+    finally:
+        slots.release()
 
 
 def _read_context(request: Request) -> WebContext:

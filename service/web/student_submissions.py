@@ -1,4 +1,4 @@
-"""Rate-limited submissions and test runs of students, for pages and API."""
+"""Rate-limited submissions and test runs of students, for pages and API. Only a few are read at a time."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ from collections.abc import Sequence
 from service.operations import submissions, test_runs
 from service.operations.context import Actor
 from service.operations.submissions import AcceptedSubmission, SubmissionRequest
-from service.web.context import WebContext
+from service.web.context import WebContext, hold_slot
 from submissions.raw_files import UploadedFile
 
 
 def submit(context: WebContext, actor: Actor, course_id: int, request: SubmissionRequest) -> AcceptedSubmission:
-    """Submit files. Raises HTTPException 429 above the rate limit, and the errors of ``submissions.submit``."""
+    """Submit files. Raises HTTPException 429 above the rate limit or 503, and the errors of ``submissions.submit``."""
     submissions.load_submission_target(context.service, actor, course_id, request.assignment)
     context.limits.submissions.spend(str(actor.person_id))
-    return submissions.submit(context.service, actor, course_id, request)
+    with hold_slot(context.reading):
+        return submissions.submit(context.service, actor, course_id, request)
 
 
 def start_test_run(
     context: WebContext, actor: Actor, course_id: int, assignment: str, files: Sequence[UploadedFile]
 ) -> str:
-    """Start a test run. Raises HTTPException 429 above the rate limit, and the errors of ``test_runs.start``."""
+    """Start a test run. Raises HTTPException 429 above the rate limit or 503, and the errors of ``test_runs.start``."""
     submissions.load_submission_target(context.service, actor, course_id, assignment)
     context.limits.test_runs.spend(str(actor.person_id))
-    return test_runs.start(context.service, actor, course_id, assignment, files)
+    with hold_slot(context.reading):
+        return test_runs.start(context.service, actor, course_id, assignment, files)

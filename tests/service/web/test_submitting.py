@@ -170,6 +170,22 @@ def test_an_assignment_that_closes_before_the_submission_is_stored_takes_none(
         open_assignments.open_for_students(session, 1, echo().id)
 
 
+def test_only_a_few_submissions_are_read_at_a_time(web: Web, ada: Member, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.web.context._SLOT_SECONDS", 0.1)
+    reading = web.app.state.context.reading
+    taken = 0
+    while reading.acquire(blocking=False):
+        taken += 1
+    assert taken == 3
+    with pytest.raises(HTTPException) as caught:
+        _submit(web, ada, ("robot.py", PROGRAM), ("responder.py", "x = 1\n"))
+    assert caught.value.status_code == 503
+    reading.release(taken)
+    _submit(web, ada, ("robot.py", PROGRAM), ("responder.py", "x = 1\n"))
+    assert reading.acquire(blocking=False)
+    reading.release()
+
+
 def test_nobody_submits_without_end(web: Web, ada: Member) -> None:
     for _ in range(10):
         with pytest.raises(UsageError):

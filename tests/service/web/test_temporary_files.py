@@ -89,7 +89,7 @@ def test_a_batch_unpacks_to_so_many_times_its_size_and_no_more(tmp_path: Path) -
 
 
 def test_one_batch_is_unpacked_at_a_time(web: Web, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.web.batch_uploads._UNPACKING_SECONDS", 0.1)
+    monkeypatch.setattr("service.web.context._SLOT_SECONDS", 0.1)
     grace = web.instructor()
     browser, token = web.browser(), web.token(grace, "manage", "read", "submit", "mark")
     kind = {**token, "content-type": "application/zip"}
