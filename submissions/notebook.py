@@ -251,8 +251,13 @@ def _get_lines(raw: Mapping[str, Any]) -> object:
 
 def _read_source(raw: Mapping[str, Any]) -> str:
     lines = _get_lines(raw)
-    text = lines if isinstance(lines, str) else "".join(map(str, _as_list(lines)))
+    text = lines if isinstance(lines, str) else _join_surrogates("".join(map(str, _as_list(lines))))
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _join_surrogates(text: str) -> str:
+    """Return the text with each pair of surrogates as one character, as in a text that was not split into lines."""
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
 
 
 def _read_tags(raw: Mapping[str, Any]) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import zipfile
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 
 from sim.errors import UsageError
 from submissions.bundle import build_submission, read_submission
+from submissions.notebook import pack_notebook, read_notebook
 from submissions.raw_files import (
     MAX_FILE_BYTES,
     MAX_FILES,
@@ -83,6 +85,14 @@ def test_the_most_that_is_accepted_is_read_back(way: str, files: dict[str, bytes
 def test_names_that_cannot_be_kept_are_refused_with_what_to_do(name: str) -> None:
     with pytest.raises(UsageError, match=r"backslash or a colon in it .*rename the file"):
         _of_folder({**PARTS, name: b"x"})
+
+
+def test_a_character_that_a_notebook_splits_is_read_back() -> None:
+    lines = ["%%sim_magic_preloaded\n", "print('\ud83e", "\udd16')"]
+    cells = [{"cell_type": "code", "source": source, "metadata": {}} for source in (lines, "".join(lines))]
+    split, whole = (read_notebook(json.dumps({"cells": [cell]}).encode(), "a.ipynb").notebook for cell in cells)
+    assert split == whole
+    assert read_notebook(pack_notebook(split), "a.ipynb").notebook == split
 
 
 def test_many_notes_are_read_back(tmp_path: Path) -> None:
