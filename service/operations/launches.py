@@ -52,6 +52,10 @@ class UnknownPlatform(Invalid):
 
 def list_keys(service: Service) -> dict[str, Any]:
     """Return the JSON Web Key Set of this installation, creating a key if there is none."""
+    with service.store.reading() as session:
+        key_set = build_public_key_set(session)
+    if key_set["keys"]:
+        return key_set  # Anybody can request the keys: take the write lock only to create one.
     with service.store.transaction() as session:
         ensure_signing_key(session)
         return build_public_key_set(session)
@@ -82,8 +86,12 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
         UsageError: The token is not trusted, or the person's id belongs to another person.
         PlatformError: The platform's keys cannot be fetched.
     """
-    with service.store.transaction() as session:
-        pending_launch = lti.take_launch(session, state)
+    with service.store.reading() as session:
+        is_started = lti.has_launch(session, state)
+    pending_launch = None
+    if is_started:  # Anybody can send a state: take the write lock only for a known one.
+        with service.store.transaction() as session:
+            pending_launch = lti.take_launch(session, state)
     if pending_launch is None:
         raise Invalid("this launch has expired or was already used; open the link in the course again")
     claims = launch.read_launch(pending_launch, id_token)

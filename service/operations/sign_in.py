@@ -38,6 +38,9 @@ def sign_in(service: Service, actor: Actor | None, secret: str) -> NewSession | 
 
     Returns None if the secret is not valid, or the token does not permit browser sign-in.
     """
+    with service.store.reading() as session:
+        if not credentials.can_sign_in(session, secret):
+            return None  # Anybody can try: take the write lock only for a valid secret.
     with service.store.transaction() as session:
         new_session = credentials.redeem_link(session, secret) or credentials.start_session(session, secret)
         if new_session is not None and actor is not None:

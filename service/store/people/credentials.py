@@ -219,6 +219,12 @@ def find_link_owner(session: Session, link: str) -> LinkOwner | None:
     return LinkOwner(row.person_id, _choose_name(row.person_id, names), row.expires_at)
 
 
+def can_sign_in(session: Session, secret: str) -> bool:
+    """Whether the secret is a valid link, or a valid token that permits browser sign-in."""
+    link = _find_valid(session, secret, CredentialKind.LINK)
+    return link is not None or _find_sign_in_token(session, secret) is not None
+
+
 def redeem_link(session: Session, link: str) -> NewSession | None:
     """Exchange a link for a new session with the same reach. None if the link is not valid."""
     row = _find_valid(session, link, CredentialKind.LINK)
@@ -240,8 +246,8 @@ def start_session(session: Session, token: str) -> NewSession | None:
 
     Returns None if the token does not permit browser sign-in.
     """
-    row = _find_valid(session, token, CredentialKind.TOKEN)
-    if row is None or "sign-in" not in row.scopes:
+    row = _find_sign_in_token(session, token)
+    if row is None:
         return None
     kind, lifetime = CredentialKind.SESSION, min(SESSION_LIFETIME, row.expires_at - now(session))
     return NewSession(
@@ -363,6 +369,11 @@ def _end_oldest_sessions(session: Session, person_id: int, current_time: datetim
     newest_query = select(Credential.id).where(*conditions).order_by(Credential.created_at.desc(), Credential.id)
     kept_ids = list(session.scalars(newest_query.limit(MAX_SESSIONS)))
     _revoke(session, *conditions, Credential.id.not_in(kept_ids))
+
+
+def _find_sign_in_token(session: Session, token: str) -> Credential | None:
+    row = _find_valid(session, token, CredentialKind.TOKEN)
+    return row if row is not None and "sign-in" in row.scopes else None
 
 
 def _find_valid(session: Session, secret: str, kind: CredentialKind) -> Credential | None:

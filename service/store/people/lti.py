@@ -197,6 +197,11 @@ def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str
     return state, nonce
 
 
+def has_launch(session: Session, state: str) -> bool:
+    """Whether a launch with this state was started and not completed yet; it may have expired."""
+    return session.get(LtiLaunch, _hash_text(state)) is not None
+
+
 def take_launch(session: Session, state: str) -> PendingLaunch | None:
     """Return and delete the launch with this state; None if it does not exist or has expired."""
     row = session.get(LtiLaunch, _hash_text(state), with_for_update={"key_share": True})

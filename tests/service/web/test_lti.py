@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -27,6 +27,7 @@ from service.operations.errors import Invalid
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
+from service.store.engine import Store
 from service.store.grades import results
 from service.store.people import lti, membership
 from service.store.people.lti import Registration
@@ -181,6 +182,23 @@ def test_a_platform_that_nobody_registered_begins_nothing(launched: tuple[Web, L
     answer = browser.get("/lti/login", params={"iss": "https://evil.example.org", "login_hint": "x"})
     assert answer.status_code == 422
     assert "registered" in answer.text
+
+
+def test_nobody_who_is_unknown_waits_for_writers_or_lets_them_wait(
+    launched: tuple[Web, LearningPlatform], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    browser = _browser(launched[0])
+    keys = browser.get("/lti/keys").json()
+    browser.cookies.set("robomark_launch", "unknown", domain="localhost.local", path="/lti")
+
+    def refuse(store: Store) -> NoReturn:
+        raise AssertionError(f"{store} was written to")
+
+    monkeypatch.setattr(Store, "transaction", refuse)
+    assert browser.get("/lti/keys").json() == keys
+    assert _end(browser, "unknown", "x").status_code == 422
+    for secret in ("x", "rms_x", "rml_x", "rmt_x"):
+        assert browser.post("/sign-in", data={"secret": secret}).status_code == 403
 
 
 def test_launches_from_unknown_platforms_keep_no_known_one_out(
