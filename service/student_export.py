@@ -53,7 +53,7 @@ def export_student(store: Store, enrolment_id: int, hidden_assignments: Set[str]
         folders, documents = {}, []
         for submission_id, document, packed_submission in _load_submissions(session, condition):
             folder = f"submissions/{_clean_name(document['assignment'])}-{document['attempt']}"
-            archive.writestr(f"{folder}/submission.zip", packed_submission)
+            archive.writestr(f"{folder}/submission.zip", packed_submission, zipfile.ZIP_STORED)
             folders[submission_id] = folder
             documents.append({**document, "folder": folder})
         for submission_id, view, report in _load_seen_grades(session, condition):

@@ -11,6 +11,7 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from service.language import translatable
 from service.operations.context import Service
 from service.settings import Settings
 from service.web.http_errors import TranslatableHTTPException
@@ -18,6 +19,7 @@ from service.web.rate_limits import RateLimits
 from sim.sentences import Sentence
 
 _SLOT_SECONDS = 30
+_UPLOAD_IN_PROGRESS = translatable("Another upload is in progress. Try again in a minute.")
 #: Reading one submission can take hundreds of megabytes.
 _MAX_SUBMISSIONS_READ = 3
 
@@ -32,6 +34,8 @@ class WebContext:
     unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
     #: Held while files of a student are read.
     reading: BoundedSemaphore = field(default_factory=partial(BoundedSemaphore, _MAX_SUBMISSIONS_READ))
+    #: Held while all data of a student are put into a zip, which can take hundreds of megabytes.
+    exporting: BoundedSemaphore = field(default_factory=BoundedSemaphore)
 
     @property
     def settings(self) -> Settings:
@@ -40,12 +44,10 @@ class WebContext:
 
 
 @contextmanager
-def hold_slot(slots: BoundedSemaphore) -> Iterator[None]:
-    """Hold one of the slots within a ``with`` block. Raises HTTPException 503 if none becomes free."""
+def hold_slot(slots: BoundedSemaphore, refusal: str = _UPLOAD_IN_PROGRESS) -> Iterator[None]:
+    """Hold one of the slots within a ``with`` block. Raises HTTPException 503 with ``refusal`` if none becomes free."""
     if not slots.acquire(timeout=_SLOT_SECONDS):
-        raise TranslatableHTTPException(
-            503, Sentence("Another upload is in progress. Try again in a minute."), {"retry-after": "60"}
-        )
+        raise TranslatableHTTPException(503, Sentence(refusal), {"retry-after": "60"})
     try:
         yield
     finally:

@@ -304,3 +304,16 @@ def test_a_cursor_with_text_that_no_database_accepts_is_refused(web: Web, text: 
     cursor = base64.urlsafe_b64encode(json.dumps([text]).encode()).decode().rstrip("=")
     answer = web.browser().get(f"/api/v1/courses/1/assignments?after={cursor}", headers=token)
     assert (answer.status_code, answer.json()["detail"]) == (422, "after: expected the `next` of the previous page.")
+
+
+def test_the_data_of_one_student_are_exported_at_a_time(
+    web: Web, grace: Program, ada: Program, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.web.context._SLOT_SECONDS", 0.1)
+    people = grace.ask("GET", "/people").json()["items"]
+    enrolment = next(each["enrolment"] for each in people if each["id"] == "ada")
+    with web.app.state.context.exporting:
+        assert "download" in ada.ask("GET", "/mine/data").json()["detail"]
+        assert grace.ask("GET", f"/people/{enrolment}/data").status_code == 503
+    assert [ada.ask("GET", "/mine/data").status_code for _ in range(3)] == [200, 200, 429]
+    assert [grace.ask("GET", f"/people/{enrolment}/data").status_code for _ in range(5)] == [200] * 5
