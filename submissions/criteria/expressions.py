@@ -40,7 +40,14 @@ def check_pattern(pattern: str) -> str:
 def has_match(text: str, pattern: str, ignore_case: bool) -> bool:
     """Return whether the pattern matches anywhere in the text. ``$`` matches the end, or before a final line feed."""
     compiled, data = _compile_pattern(pattern, ignore_case), text.encode("utf-8", "replace")
-    return any(compiled.search(each) is not None for each in {data, data.removesuffix(b"\n")})
+    shortened_data = data if _has_end_escape(pattern) else data.removesuffix(b"\n")
+    return any(compiled.search(each) is not None for each in {data, shortened_data})
+
+
+@functools.lru_cache(maxsize=256)
+def _has_end_escape(pattern: str) -> bool:
+    r"""Whether the pattern has \Z, which matches after a final line feed only."""
+    return r"\Z" in _PART.findall(pattern)
 
 
 @functools.lru_cache(maxsize=256)

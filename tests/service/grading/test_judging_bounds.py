@@ -225,7 +225,7 @@ def test_a_pattern_that_cannot_be_used_is_refused_with_its_line(
 _PATTERNS = [
     r"^\d+$", r"\w", r"^\w+$", r"\W", r"^\s*$", r"\S\s\S", r"^(0|1|0?\.\d+|0\.\d+|1\.0+|\d\.\d+e-\d+)$", r"[a-z]",
     r"[^\d]x", r"[]a]", r"[^]a]b", r"[\]\d]$", r"a{,2}b", r"a.b", r"^.$", "a|^b|c$", r"(?i)é", r"\.", r"\\",
-    r"\D\d", r"[\s\D]1", r"^(\w+\s?)+$", "GREY", r"(?m)^a$", r"(?s)a.b",
+    r"\D\d", r"[\s\D]1", r"^(\w+\s?)+$", "GREY", r"(?m)^a$", r"(?s)a.b", r"b\Z", r"[a-c]\Z",
 ]  # fmt: skip
 
 
@@ -239,6 +239,8 @@ def test_patterns_mean_what_they_mean_in_python(pattern: str, text: str, ignore_
 def test_the_very_end_is_told_from_the_end_of_a_line() -> None:
     assert has_match("ab", r"b\Z", False)
     assert not has_match("ab\ncd", r"b\Z", False)
+    assert not has_match("ab\n", r"b\Z", False)
+    assert has_match("ab\n", "b$", False)
     assert not has_match("ab\ncd", "b$", False)
 
 
