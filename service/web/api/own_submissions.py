@@ -271,6 +271,7 @@ def replay(request: Request, access: ReadAccess, context: Context, submission_id
 @router.get(PREFIX + "/submissions/{submission_id}/files", responses=ZIP_RESPONSES, response_class=Response)
 def files(access: ReadAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files, as a zip that can be submitted again."""
+    context.limits.files.spend(str(access.actor.person_id))
     archive = own_views.show_files(context.service, access.actor, access.course_id, submission_id)
     return respond_with_attachment(archive.data, archive.name, "application/zip")
 

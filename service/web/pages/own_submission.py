@@ -61,5 +61,6 @@ def show_own_submission(
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/files")
 def download_own_files(access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Return the submitted files as a zip that can be submitted again."""
+    context.limits.files.spend(str(access.actor.person_id))
     archive = own_views.show_files(context.service, access.actor, access.course_id, submission_id)
     return respond_with_attachment(archive.data, archive.name, "application/zip")

@@ -317,3 +317,9 @@ def test_the_data_of_one_student_are_exported_at_a_time(
         assert grace.ask("GET", f"/people/{enrolment}/data").status_code == 503
     assert [ada.ask("GET", "/mine/data").status_code for _ in range(3)] == [200, 200, 429]
     assert [grace.ask("GET", f"/people/{enrolment}/data").status_code for _ in range(5)] == [200] * 5
+
+
+def test_the_files_of_submissions_are_not_downloaded_without_end(web: Web, ada: Program) -> None:
+    assert [ada.ask("GET", "/mine/submissions/99/files").status_code for _ in range(21)] == [404] * 20 + [429]
+    page = "/courses/1/mine/submissions/99/files"
+    assert web.browser(web.student()).get(page).status_code == 429
