@@ -85,6 +85,13 @@ def _ask_for_code_cell(position: int) -> Sentence:
     )
 
 
+#: Lines of a robot program, which a cell of the responder does not have.
+_ROBOT_CODE = re.compile(
+    r"^\s*(?:tank_(?:drive|turn)\.|say\(|print\(f?[\"'](?:PY::|IMG_DATA)|(?:from|import) ev3dev2)", re.MULTILINE
+)
+_RESPONDER_CODE = re.compile(r"^def (?:\w+_)?responder\(|\bpyresponder\b", re.MULTILINE)
+
+
 def describe_near_program(notebook: Notebook) -> str | Sentence:
     """Describe a line that is almost a program's magic, or is one in the wrong place such as a Markdown cell."""
     for position in notebook.markdown_programs:
@@ -100,6 +107,12 @@ def describe_near_program(notebook: Notebook) -> str | Sentence:
                     "why": _explain_near_magic(line),
                 }
                 return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
+    for cell in notebook.cells:
+        if _ROBOT_CODE.search(cell.source) and not _RESPONDER_CODE.search(cell.source):
+            return Sentence(
+                "; cell %(cell)s looks like one: write %(magic)s as its first line",
+                {"cell": cell.number, "magic": "%%sim_magic_preloaded"},
+            )
     return ""
 
 

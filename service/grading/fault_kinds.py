@@ -21,6 +21,21 @@ class FaultKind(Enum):
     NOT_CALLABLE = r"^TypeError: '(\w+)' object is not callable"  # type
     WRONG_ARGUMENTS = r"^TypeError: (?:([\w.]+)\.)?(\w+)\(\) (?:takes|missing)"  # class, function
     WRONG_UNPACKING = r"^ValueError: (?:too many|not enough) values to unpack"
+    TOO_MANY_ARGUMENTS = r"^TypeError: .* takes .* (?:given|positional)"
+    #: function, keyword
+    UNEXPECTED_KEYWORD = r"^TypeError: (?:\w+\.)*(\w+)\(\) got an unexpected keyword argument '(\w+)'"
+    TEXT_OPERAND = (
+        r"^TypeError: (?:unsupported operand type\(s\) for |'[<>=]+' not supported between |can only concatenate )"
+        r".*str"
+    )
+    LIST_OPERAND = r"^TypeError: .*(?:'list'|can't multiply sequence|can only concatenate list)"
+    TUPLE_OPERAND = r"^TypeError: .*\btuple\b"
+    DEVICE_OPERAND = r"^TypeError: .*'(ColorSensor|UltrasonicSensor|GyroSensor|LargeMotor)'"  # class
+    JOINED_OBJECT = r"can only concatenate str \(not \"dict\"\)"
+    FEATURE_COUNTS = r"X has (\d+) features, but \w+ is expecting (\d+)"  # actual, expected
+    SAMPLE_COUNTS = r"inconsistent numbers of samples: \[(\d+), (\d+)\]"  # rows, labels
+    TEXT_LABELS = r"did not contain a loop with signature matching types \(dtype\('<U"
+    ANY_EXCEPTION = r"^(?:\w+\.)*(\w+): "  # class
     TEXT_INDEX = r"^TypeError: string indices"
     NONE_OBJECT = r"'NoneType' object"
     NO_NUMBER = r"could not convert string to float"

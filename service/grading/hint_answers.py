@@ -30,6 +30,9 @@ _NONE_VALUE = re.compile(r"\bNone\b|\bnull\b")
 _TEXT_NUMBER = re.compile(r'"(\w+)"\s*:\s*"(-?\d+(?:\.\d+)?)"')
 _IMAGE_LOG = re.compile(r"image_data (?:left|right|both)\Z")
 _MIN_SIMILARITY = 0.6
+#: A key with an object or a list as its value.
+_OBJECT_VALUE = re.compile(r"""['"](\w+)['"]: ([\[{])""")
+_PAIR = re.compile(r"\w+(?: , \w+)+\Z")
 #: The number of answers that show a constant shift.
 _MIN_SHIFTED_ANSWERS = 2
 
@@ -96,8 +99,14 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
     """Yield the line that makes a wrong value of an answer, with how it differs from the expected one."""
     for criterion in clues.costliest_criteria[:1]:
         path = (criterion.path or "") if isinstance(criterion, Replies) else ""
+        difference = _describe_value_difference(criterion, clues) if isinstance(criterion, Replies) and path else ""
+        if difference:
+            yield difference
+            return
         answer = clues.find_finding(criterion, OtherAnswer) if path else None
-        location = _describe_key_line([path.rpartition(".")[2]], clues) if answer else ""
+        location = ""
+        if answer is not None:
+            location = _describe_words_line(answer.text, clues) or _describe_key_line([path.rpartition(".")[2]], clues)
         if answer is None or not location or not isinstance(criterion, Replies):
             continue
         expected = next((each for each in criterion.expect.values() if str(each).endswith(answer.text)), "")
@@ -107,6 +116,23 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
         if advice:
             yield f"{location} answers {quote_text(answer.text)} at {path}. {advice}"
             return
+
+
+def _describe_value_difference(criterion: Replies, clues: Clues) -> str:
+    """Return how the first wrong answer to a known question differs from the expected one, with its line."""
+    path = criterion.path or ""
+    for recording in clues.recordings:
+        for message in recording.messages if not criterion.agents else ():
+            question = recording.messages[message.reply_to].text if message.reply_to is not None else ""
+            expected, value = criterion.expect.get(question), _parse_answer(message.text)
+            for key in path.split("."):
+                value = value.get(key) if isinstance(value, dict) else None
+            if not isinstance(value, str) or expected is None or value == expected:
+                continue
+            advice = advise_on_difference(expected, value)
+            location = _describe_words_line(value, clues) or _describe_key_line([path.rpartition(".")[2]], clues)
+            return f"{location} answers {quote_text(value)}. {advice}" if advice and location else ""
+    return ""
 
 
 def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
@@ -193,6 +219,41 @@ def hint_about_image_command(clues: Clues) -> Iterator[str]:
             return
 
 
+def hint_about_quoted_object(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a key whose value is the text of an object, where the object is expected."""
+    for criterion in clues.lost:
+        for text in criterion.contains if isinstance(criterion, Replies) else ():
+            match = _OBJECT_VALUE.match(text)
+            quoted = re.compile(rf"""['"]{match[1]}['"]: ['"]\{match[2]}""") if match is not None else None
+            if match is None or quoted is None or not any(quoted.search(each) for each in clues.answers):
+                continue
+            location = _describe_key_line([match[1]], clues)
+            if location:
+                yield (
+                    f"{location}: the value of {quote_text(match[1])} is a text, and not the object in it. Make the "
+                    "object with ast.literal_eval(...) first"
+                )
+                return
+
+
+def hint_about_returned_pair(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``return kind, thing`` where the answer should have an object with as many keys."""
+    for criterion in clues.lost:
+        texts = criterion.contains if isinstance(criterion, Replies) else ()
+        keys = list(dict.fromkeys(found[1] for text in texts if (found := _KEY.match(text))))
+        if not keys or any(key in _KEY.findall(answer) for answer in clues.answers for key in keys[:1]):
+            continue
+        for listing in clues.responder_process_listings:
+            for statement in listing.code.statements:
+                if statement.keyword == "return" and _PAIR.match(" ".join(statement.tokens[1:])):
+                    names = ", ".join(f'"{key}": ...' for key in keys)
+                    yield (
+                        f"{listing.locate(statement.line)} returns several values, without keys. Write an object with "
+                        f"the keys that are asked for: return {{{names}}}"
+                    )
+                    return
+
+
 def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
     """Yield a hint on a key required within a text, as in ``"'typ': 'PY'"``."""
     for criterion in clues.lost:
@@ -237,3 +298,16 @@ def _describe_key_line(keys: list[str], clues: Clues) -> str:
             if line is not None:
                 return listing.locate(line)
     return ""
+
+
+def _describe_words_line(text: str, clues: Clues) -> str:
+    """Return the only line of the responder or an agent that has the first words of a text in quotes."""
+    opening = text.rpartition(" ")[0]
+    pattern = re.compile(rf"""["']{re.escape(opening)}""")
+    lines = [
+        listing.locate(number)
+        for listing in clues.responder_process_listings
+        for number, line in enumerate(listing.lines, 1)
+        if opening and pattern.search(line)
+    ]
+    return lines[0] if len(lines) == 1 else ""

@@ -82,6 +82,7 @@ class Clues:
         practice: The results of visible criteria without marks, which show what the marked ones look at.
         shown: The visible trials.
         recordings_by_trial: Their recordings, by the index of the trial in the grade.
+        table_columns: The column names of the CSV files beside the responder.
     """
 
     listings: tuple[Listing, ...]
@@ -104,6 +105,7 @@ class Clues:
     practice: tuple[CriterionResult, ...] = ()
     shown: tuple[TrialResult, ...] = ()
     recordings_by_trial: Mapping[int, Recording] = field(default_factory=dict)
+    table_columns: tuple[str, ...] = ()
 
     @property
     def cell_errors(self) -> tuple[Fault, ...]:
@@ -248,7 +250,15 @@ def collect_clues(
         ),
         tuple(trial for trial in trials if trial.visibility == "visible"),
         {index: trials[index].recording for index in visible_indices},
+        tuple(_collect_columns({**plan.assignment.given, **submission.files})),
     )
+
+
+def _collect_columns(files: Mapping[str, bytes]) -> Iterator[str]:
+    """Yield the column names in the first line of each CSV file."""
+    for name in [each for each in sorted(files) if each.endswith(".csv")][:_MAX_EXTRA_FILES]:
+        first_line = files[name][:MAX_TEXT_LENGTH].partition(b"\n")[0].decode("utf-8", "replace")
+        yield from (each.strip(" \"'\r\ufeff") for each in first_line.split(",") if each.strip())
 
 
 def remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -> CriterionResult:

@@ -165,7 +165,7 @@ def guess_result_name(body: Sequence[Statement]) -> str:
     fitted_names = [
         call.name.removesuffix(".fit") for each in body for call in each.calls if call.name.endswith(".fit")
     ]
-    assigned_names = [each.target for each in body if each.target]
+    assigned_names = [each.target or each.tokens[0] for each in body if each.target or "+=" in each.tokens[1:2]]
     return next(iter((*fitted_names, *assigned_names[::-1])), "")
 
 

@@ -1,11 +1,13 @@
-"""Hints from counterfactual runs: which single number of the program, changed, would have met the criterion.
+"""Hints from counterfactual runs: which single number, or which two lines exchanged, would have met the criterion.
 
-Each line that moves the robot is scaled in the recorded path, and the criterion is judged on the changed path. Nothing
-is simulated, so this applies only to programs that drive without sensors. Only visible trials are used.
+Each line that moves the robot is scaled in the recorded path, then each two lines that follow each other are exchanged.
+The criterion is judged on the changed path. Nothing is simulated, so this applies only to programs that drive without
+sensors. Only visible trials are used.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -83,6 +85,15 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
             best = -total, size, change, factor
     if best is not None:
         yield _describe_change(best[2], best[3], failure)
+        return
+    for first, second, order in _collect_exchanges(listing, trials)[: min(_MAX_LINES, _MAX_TICKS // max(ticks, 1))]:
+        exchanged = [replace(each, recording=_reorder_motion(each.recording, order)) for each in trials]
+        if _has_full_marks(criterion, clues, exchanged):
+            yield (
+                f"{listing.locate(first.line)}: {failure[0].lower()}{failure[1:].rstrip('.')}. Lines {first.line} and "
+                f"{second.line} are in the wrong order: exchange them"
+            )
+            return
 
 
 def _choose_factor(passing_factors: list[float]) -> float:
@@ -125,6 +136,27 @@ def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_C
             yield _Change(listing, statement, call, ticks)
 
 
+def _collect_exchanges(listing: Listing, trials: list[TrialResult]) -> list[tuple[Statement, Statement, np.ndarray]]:
+    """Return pairs of moving lines that follow each other, and the order of the ticks if they were exchanged.
+
+    Empty for several trials, whose ticks differ.
+    """
+    if len(trials) > 1:
+        return []
+    _, lines = _find_lines_at_ticks(trials[0].recording)
+    borders = [0, *(np.flatnonzero(np.diff(lines)) + 1), len(lines)]
+    runs = list(itertools.pairwise(int(each) for each in borders))
+    exchanges = []
+    for (start, middle), (_, end) in itertools.pairwise(runs):
+        first, second = (listing.code.find_statement(int(lines[at])) for at in (start, middle))
+        is_together = first is not None and second is not None and first.parent == second.parent == -1
+        if first is not None and second is not None and is_together and first.tokens != second.tokens:
+            order = np.arange(len(lines))
+            order[start:end] = np.concatenate([order[middle:end], order[start:middle]])
+            exchanges.append((first, second, order))
+    return exchanges
+
+
 def _find_lines_at_ticks(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Return the innermost and the outermost line that ran during each tick."""
     starts = np.array([each.t for each in recording.places])
@@ -159,17 +191,33 @@ def _scale_motion(recording: Recording, selected_ticks: np.ndarray, factor: floa
     """Return the recording with the motion of some ticks scaled."""
     steps = _compute_steps(recording)
     steps[selected_ticks] *= factor
+    scale = np.where(selected_ticks, factor, 1.0)
+    left, right = (np.diff(each, prepend=0.0) * scale for each in _list_wheel_positions(recording))
+    return _rebuild_path(recording, steps, left, right)
+
+
+def _reorder_motion(recording: Recording, order: np.ndarray) -> Recording:
+    """Return the recording with the motion of its ticks in another order."""
+    left, right = (np.diff(each, prepend=0.0)[order] for each in _list_wheel_positions(recording))
+    return _rebuild_path(recording, _compute_steps(recording)[order], left, right)
+
+
+def _list_wheel_positions(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    return recording.ticks.left_position, recording.ticks.right_position
+
+
+def _rebuild_path(recording: Recording, steps: np.ndarray, left: np.ndarray, right: np.ndarray) -> Recording:
+    """Return the recording with the path that follows from the steps of the robot and of its wheels."""
     start, ticks = recording.start, recording.ticks
     heading = start.heading + np.cumsum(steps[:, 2])
     headings_before = np.radians(np.concatenate([[start.heading], heading[:-1]]))
     x = start.x + np.cumsum(steps[:, 0] * np.cos(headings_before) - steps[:, 1] * np.sin(headings_before))
     y = start.y + np.cumsum(steps[:, 0] * np.sin(headings_before) + steps[:, 1] * np.cos(headings_before))
-    scale = np.where(selected_ticks, factor, 1.0)
-    wheels = (np.cumsum(np.diff(each, prepend=0.0) * scale) for each in (ticks.left_position, ticks.right_position))
-    left_position, right_position = wheels
     end = Pose(float(x[-1]), float(y[-1]), float(heading[-1]))
-    scaled_ticks = replace(ticks, x=x, y=y, heading=heading, left_position=left_position, right_position=right_position)
-    return replace(recording, ticks=scaled_ticks, end=end)
+    changed_ticks = replace(
+        ticks, x=x, y=y, heading=heading, left_position=np.cumsum(left), right_position=np.cumsum(right)
+    )
+    return replace(recording, ticks=changed_ticks, end=end)
 
 
 def _has_full_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> bool:

@@ -3,7 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+from responders.message_format import PY
+
+_MAX_CHARACTERS = 20_000
+#: Factors between units, as programs write them.
+_FACTORS: Mapping[str, float] = MappingProxyType(
+    {"math.pi": 3.14159, "10": 10, "25.4": 25.4, "180 / math.pi": 57.2958, "100": 100, "360": 360, "1000": 1000}
+)
+_TOLERANCE = 1.0001
+_LIST = re.compile(r"\[[^\[\]]*\]|\([^()]*,[^()]*\)|\{[^{}]*\}")
+_SIGNS = re.compile(r"[^\w\s]")
 
 
 def advise_on_difference(expected: object, actual: object) -> str:
@@ -38,6 +51,36 @@ def _advise_on_numbers(expected: float, actual: float) -> str:
         if 1.5 < ratio < 1000.5 and abs(ratio - round(ratio)) < 1e-6 * ratio:
             size = "small: multiply" if ratio == factor else "large: divide"
             return f"It is {round(ratio)} times too {size} by {round(ratio)}"
+    return describe_factor(factor, factor)
+
+
+def _find_list_in_text(expected: str, actual: str) -> str:
+    """Return advice on a text with a whole list where one entry of the list is expected; otherwise empty."""
+    match = _LIST.search(actual)
+    if match is None:
+        return ""
+    start, end = actual[: match.start()], actual[match.end() :]
+    if not (expected.startswith(start) and expected.endswith(end)):
+        return ""
+    if match[0].startswith("{"):
+        values = re.findall(r"""['"](\w+)['"]: ['"]([^'"]*)['"]""", match[0])
+        value = expected[len(start) : len(expected) - len(end)]
+        key = next((key for key, found in values if found == value), "")
+        return f'The object is written as a whole: take its value with ["{key}"]' if key else ""
+    entries = [each.strip(" '\"") for each in match[0][1:-1].split(",")]
+    entry = expected[len(start) : len(expected) - len(end)]
+    return f"{match[0]} is a list: take one entry, [{entries.index(entry)}]" if entry in entries else ""
+
+
+def describe_factor(minimum: float, maximum: float) -> str:
+    """Return advice on a value that must be multiplied by a number in this range; empty if that is no known factor."""
+    if not 0 < minimum <= maximum < math.inf:
+        return ""
+    for name, factor in _FACTORS.items():
+        if minimum <= factor * _TOLERANCE and factor / _TOLERANCE <= maximum:
+            return f"It is {factor:g} times too small: multiply by {name}"
+        if minimum <= _TOLERANCE / factor and 1 / (factor * _TOLERANCE) <= maximum:
+            return f"It is {factor:g} times too large: divide by {name}"
     return ""
 
 
@@ -60,4 +103,15 @@ def _advise_on_texts(expected: str, actual: str) -> str:
         return f'"{expected.removeprefix(actual)}" is missing at its end'
     if expected and actual.endswith(expected):
         return f'Remove "{actual.removesuffix(expected)}" at its start'
+    if actual.replace(PY, "", 1) == expected:
+        return f'Take {PY} off the message first: text.removeprefix("{PY}")'
+    if actual.casefold() == expected.casefold():
+        return f'Only capital and small letters differ: write "{expected}"'
+    if _SIGNS.sub("", actual) == _SIGNS.sub("", expected):
+        return f'Only signs differ: write "{expected}"'
+    entry = _find_list_in_text(expected, actual)
+    if entry:
+        return entry
+    if "".join(actual.split()) == "".join(expected.split()):
+        return "Only blanks differ"
     return ""

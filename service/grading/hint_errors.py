@@ -16,7 +16,6 @@ from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
-from service.grading.hint_motion import describe_skipped_loops
 from service.grading.hint_names import (
     PRELOADED,
     advise_on_constant,
@@ -26,6 +25,21 @@ from service.grading.hint_names import (
     advise_on_overwritten_name,
     advise_on_owner,
 )
+from service.grading.hint_operands import (
+    advise_on_decimal_comma,
+    advise_on_device,
+    advise_on_keyword,
+    advise_on_list_operand,
+    advise_on_mean_axis,
+    advise_on_missing_alias,
+    advise_on_narrow_except,
+    advise_on_parameter,
+    advise_on_sample_count,
+    advise_on_short_list,
+    advise_on_text_operand,
+    advise_on_whole_object,
+)
+from service.grading.hint_skipped_loops import describe_skipped_loops
 from service.grading.hint_syntax import advise_on_syntax
 from service.grading.hint_tables import ADVICE, PROPERTIES, UNAVAILABLE_MODULES, USAGE
 from service.grading.judging.message_parts import quote_text
@@ -192,6 +206,13 @@ def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statem
     return ""
 
 
+def _advise_on_labels(fault: Fault, *_: object) -> str:
+    """Return advice on a network for numbers that is trained with texts as labels."""
+    if not is_kind(fault, FaultKind.TEXT_LABELS):
+        return ""
+    return "The labels are texts: use a classifier, such as MLPClassifier, and no regressor."
+
+
 def _advise_on_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a speed given in the position of the steering."""
     calls = () if statement is None or not is_kind(fault, FaultKind.NO_SPEED) else statement.calls
@@ -228,7 +249,8 @@ def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
         return ""
     (missing_key,) = values
     texts = (*clues.answers, *clues.sent, *(line for each in clues.listings for line in each.lines))
-    keys = list(dict.fromkeys(key for text in texts for key in _KEY.findall(text) if key != missing_key))[:200]
+    code_keys = (key for text in texts for key in _KEY.findall(text))
+    keys = list(dict.fromkeys(key for key in (*clues.table_columns, *code_keys) if key != missing_key))[:200]
     similar_keys = difflib.get_close_matches(missing_key, keys, 1, _NEAR_KEY)
     if similar_keys:
         return f'Did you mean "{similar_keys[0]}"?'
@@ -294,10 +316,23 @@ _ADVISERS: Sequence[_Adviser] = (
     _advise_on_missing_file,
     _advise_on_key,
     _advise_on_call,
+    advise_on_decimal_comma,
     _advise_on_usage,
     _advise_on_unpacking,
     _advise_on_steering,
     _advise_on_fit,
+    advise_on_keyword,
+    advise_on_short_list,
+    advise_on_parameter,
+    advise_on_mean_axis,
+    advise_on_missing_alias,
+    advise_on_sample_count,
+    advise_on_text_operand,
+    advise_on_list_operand,
+    advise_on_device,
+    advise_on_whole_object,
+    _advise_on_labels,
     _advise_from_hint,
     _advise_from_table,
+    advise_on_narrow_except,
 )

@@ -24,6 +24,7 @@ from submissions.criteria import Criterion
 from submissions.criteria.ending import EndPose
 from submissions.criteria.line import Follows, Laps
 from submissions.criteria.motion import Moves
+from submissions.criteria.reporting import Reports
 from submissions.criteria.stopping import StopOn
 from submissions.criteria.unreliable_channel import Resends
 
@@ -213,12 +214,14 @@ def _hint_about_other_sensor(failure: _Failure) -> str:
     named_sides = {each.lower() for each in _ONE_SENSOR.findall(f"{failure.found} {failure.task}")}
     required_property = _SIDES.get(side) or (_SIDES[named_sides.pop()] if len(named_sides) == 1 else "")
     other_property = "colorRight" if required_property == "colorLeft" else "colorLeft"
-    statement = next((each for each in failure.listing.code.statements if each.has_token(other_property)), None)
-    if (
-        not required_property
-        or statement is None
-        or any(each.has_token(required_property) for each in failure.listing.code.statements)
-    ):
+    statements = failure.listing.code.statements
+    statement = next((each for each in statements if each.has_token(other_property)), None)
+    is_output = statement is not None and any(call.name in _WRITING_FUNCTIONS for call in statement.calls)
+    # A report with one side's sensor is wrong beside reports with the other's. Other readings may be meant.
+    is_mixed = any(each.has_token(required_property) for each in statements) and not (
+        is_output and isinstance(failure.criterion, Reports)
+    )
+    if not required_property or statement is None or is_mixed:
         return ""
     return (
         f"{failure.listing.locate(statement.line)} reads {other_property}, but {required_property} is judged: "

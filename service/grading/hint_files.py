@@ -23,6 +23,8 @@ _ROBOT = re.compile(
     r"^\s*(?:from|import) ev3dev2|^[^#]*(?:print\(f?[\"'](?:PY::|IMG_DATA)|tank_(?:drive|turn)\.|\bsay\()"
 )
 #: A word that is not a flag, and on the next line the flag with the word before it.
+#: Flags of one letter with a - before each, and no blanks.
+_JOINED_FLAGS = re.compile(r"(?<=\s)(?:-[A-Za-z]){2,}(?=\s|$)")
 _CUT_VALUE = re.compile(r"'(\w+)' is not a flag\n.*?(-[br]|--background|--robotSetup) (\w+) \1\b")
 
 
@@ -97,6 +99,9 @@ def hint_about_ignored_magic(clues: Clues) -> Iterator[str]:
             cut_match = _CUT_VALUE.search(f"{reason}\n{listing.lines[magic_index]}")
             if cut_match is not None:
                 fix = f"The value of {cut_match[2]} has no blank: write {cut_match[2]} {cut_match[3]}_{cut_match[1]}"
+            elif (joined_match := _JOINED_FLAGS.search(listing.lines[magic_index])) is not None:
+                joined_flags = joined_match[0].replace("-", "")
+                fix = f"Write one - before the letters, -{joined_flags}, or a blank before each -"
             elif needs_pen:
                 fix = "Write -p to put the pen down, and check the other flags"
             else:

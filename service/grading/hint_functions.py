@@ -6,9 +6,11 @@ Calls and return values come from the criteria's results. No robot runs.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
+from responders.message_format import IMG_DATA, PY
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.findings import FailedCall, UnloadedResponder, WrongHiddenCalls, WrongReturn
 from service.grading.hint_clues import Clues, Listing
@@ -20,6 +22,12 @@ from submissions.criteria.code import Functions
 from submissions.raw_files import sanitise_name
 
 _MIN_SIMILARITY = 0.75
+#: Functions that make an object from a text, and methods that take the beginning of a text off.
+_READERS = frozenset({"loads", "literal_eval"})
+_PREFIX_METHODS = frozenset({"removeprefix", "partition", "split", "replace", "lstrip", "find", "index"})
+_SLICE = re.compile(r"\[\w*\s*:")
+#: Errors of programs that read a message. An ``except`` with three of them catches enough.
+_COMMON_ERRORS = frozenset({"ValueError", "KeyError", "TypeError", "IndexError", "SyntaxError", "AttributeError"})
 
 
 def hint_about_returned_values(clues: Clues) -> Iterator[str]:
@@ -30,7 +38,9 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
         if wrong is None:
             continue
         advice = advise_on_difference(wrong.expected, wrong.returned)
-        value_statement = _find_value_statement(wrong.function, clues)
+        if not advice and isinstance(wrong.returned, list) and isinstance(next(iter(wrong.returned), None), list):
+            advice = advise_on_difference([], [[]])
+        value_statement = _find_literal_statement(wrong.returned, clues) or _find_value_statement(wrong.function, clues)
         if value_statement is not None:
             listing, statement = value_statement
             fix = advice or "Work this call out by hand, line by line, and compare"
@@ -41,6 +51,32 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
             return
 
 
+def hint_about_hidden_prefix(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``json.loads(text)`` of a text that begins with PY::, which fails within ``try``."""
+    texts = [
+        argument
+        for each in clues.lost
+        if isinstance(each, Functions)
+        for call in each.calls
+        for argument in call.arguments
+        if isinstance(argument, str) and argument.startswith((PY, f"{IMG_DATA}::"))
+    ]
+    for listing in clues.responders if texts else ():
+        statements = listing.code.statements
+        if any(each.has_token(*_PREFIX_METHODS) for each in statements) or listing.find_line(_SLICE):
+            continue
+        for statement in statements:
+            call = next((one for one in statement.calls if one.name.rpartition(".")[2] in _READERS), None)
+            if call is not None and len(call.arguments) == 1 and len(call.arguments[0]) == 1:
+                prefix = texts[0].partition("::")[0]
+                fixed = f'{call.name}({call.arguments[0][0]}.removeprefix("{prefix}::"))'
+                yield (
+                    f"{listing.locate(statement.line)} reads the whole text, which begins with {prefix}::, and fails. "
+                    f"Take the beginning off: {fixed}"
+                )
+                return
+
+
 def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
     """Yield a hint on an ``except`` that catches too few errors, if only hidden calls failed."""
     for criterion in clues.costliest_criteria:
@@ -48,13 +84,27 @@ def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
             continue
         for listing in clues.responders:
             for statement in listing.code.statements:
-                if statement.keyword == "except" and len(statement.tokens) > 2 and not statement.has_token("Exception"):
+                is_narrow = len(statement.tokens) > 2 and len(_COMMON_ERRORS & set(statement.tokens)) < 3
+                if statement.keyword == "except" and is_narrow and not statement.has_token("Exception"):
                     yield (
                         f"{listing.locate(statement.line)} catches only "
                         f"{join_tokens(statement.tokens[1:]).rstrip(':')}. Another error, such as KeyError or "
                         "TypeError, ends the function. Write except Exception:"
                     )
                     return
+
+
+def _find_literal_statement(value: object, clues: Clues) -> tuple[Listing, Statement] | None:
+    """Return the only statement that returns or assigns a text in quotes; None for other values."""
+    if not isinstance(value, str) or not value:
+        return None
+    candidates = [
+        (listing, each)
+        for listing in clues.responders
+        for each in listing.code.statements
+        if each.tokens[-1][:1] in ("'", '"') and each.tokens[-1][1:-1] == value
+    ]
+    return candidates[0] if len(candidates) == 1 else None
 
 
 def _find_value_statement(name: str, clues: Clues) -> tuple[Listing, Statement] | None:

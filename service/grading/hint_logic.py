@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from service.grading.findings import OtherWord
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import LOOPS, Statement, join_tokens
+from service.grading.hint_code import LOOPS, CallInCode, Statement, join_tokens
 from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES
@@ -20,7 +20,7 @@ from sim.recording import Pose, Recording
 from submissions.criteria.ending import EndPose
 from submissions.criteria.motion import Excursions
 from submissions.criteria.sequence import WordSequence
-from submissions.criteria.texts import Says
+from submissions.criteria.texts import Says, TextSequence
 
 _FIRST_VALUE_NAME = re.compile(r"(?:\w+_)?(?:begin|beginning|start|first)(?:_\w+)?\Z", re.IGNORECASE)
 _AWAY = 60.0
@@ -75,6 +75,26 @@ def hint_about_range_step(clues: Clues) -> Iterator[str]:
                 f"{last_number}, and not {expected}. The third number is the step: write range({', '.join(arguments)})"
             )
             return
+
+
+def hint_about_large_step(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``range(0, 5, 2)`` that leaves out numbers that must be printed, said or sent."""
+    for criterion in clues.lost:
+        texts = criterion.in_order if isinstance(criterion, TextSequence) else ()
+        required = {int(each) for each in texts if each.isdecimal()}
+        for listing, statement in collect_statements(clues) if required else ():
+            call = next((one for one in statement.calls if one.name == "range"), None)
+            numbers = [listing.code.number(one) for one in call.arguments] if call is not None else []
+            if call is None or len(numbers) != 3 or None in numbers or statement.keyword != "for":
+                continue
+            start, end, step = (int(each) for each in numbers if each is not None)
+            left_out = sorted(required & set(range(start, end)) - set(range(start, end, step))) if step > 1 else []
+            if left_out:
+                yield (
+                    f"{listing.locate(statement.line)}: range({format_arguments(call.arguments)}) counts in steps of "
+                    f"{step}, and leaves out {left_out[0]}. Write range({start}, {end})"
+                )
+                return
 
 
 def hint_about_first_value(clues: Clues) -> Iterator[str]:
@@ -162,6 +182,13 @@ def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
         return
     moves = [(listing, each) for listing, each in collect_statements(clues) if has_motor_call(each, LIMITED_MOVES)]
     calls = [call for _, each in moves for call in each.calls if call.name.rpartition(".")[2] in LIMITED_MOVES]
+    for listing, statement in moves:
+        if any(_has_opposite_speeds(listing, call) for call in statement.calls):
+            yield (
+                f"{listing.locate(statement.line)} turns the robot on the spot, because only one speed has a minus. To "
+                "drive backwards, write - before both speeds"
+            )
+            return
     has_turn = any("turn" in call.name or "-" in "".join(map("".join, call.arguments)) for call in calls)
     if len(moves) > 1 and not has_turn:
         listing, statement = moves[-1]
@@ -169,6 +196,14 @@ def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
             f"{listing.locate(statement.line)} drives forwards like the lines before it, so the robot never comes "
             "back. Write - before both speeds to drive backwards"
         )
+
+
+def _has_opposite_speeds(listing: Listing, call: CallInCode) -> bool:
+    """Return whether the wheels turn against each other, with the same speed."""
+    if not call.name.startswith("tank_drive.") or len(call.arguments) < 2:
+        return False
+    texts = ["".join(each).replace("-", "") for each in call.arguments[:2]]
+    return texts[0] == texts[1] and ("-" in call.arguments[0]) != ("-" in call.arguments[1])
 
 
 def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from service.grading.findings import ReportedFault
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
-from service.grading.hint_tables import AMOUNTS, LIMITED_MOVES, PROPERTIES, READINGS
+from service.grading.hint_tables import AMOUNTS, CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
 
@@ -54,6 +54,9 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
     amount = describe_large_amount(code, statement, clues.limit)
     if amount:
         return f"{listing.locate(statement.line)}: {amount}"
+    passed_amount = _describe_passed_amount(code, listing, statement)
+    if passed_amount:
+        return passed_amount
     loops = code.list_enclosing_loops(statement)
     for loop in loops:
         explanation = _explain_endless_loop(loop, code, listing, fault)
@@ -61,6 +64,15 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
             return explanation
     stop_event = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
     part_name = "responder" if fault.who == "responder" else "program"
+    if loops and clues.is_stationary and _waits_for_motion(loops[0], code):
+        return (
+            f"{listing.locate(loops[0].line)}: the loop waits until the robot has moved, but no line switches the "
+            f"motors on, so {join_tokens(loops[0].condition)} stays true. Write tank_drive.on(20, 20) above line "
+            f"{loops[0].line}"
+        )
+    if loops and loops[0].has_token("pyState") and not clues.answers:
+        reason = "no answer came" if clues.sent else "no message was sent: print one that begins with PY:: or IMG_DATA"
+        return f"{listing.locate(loops[0].line)}: the loop waits for a message in the queue, but {reason}"
     if loops:
         head = join_tokens(loops[0].tokens)
         return (
@@ -71,6 +83,13 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
         f'{listing.locate(statement.line)}: the {part_name} was still in the line "{join_tokens(statement.tokens)}" '
         f"when {stop_event}. Check what it waits for, and whether that ever happens"
     )
+
+
+def _waits_for_motion(loop: Statement, code: CodeStatements) -> bool:
+    """Return whether a loop's condition reads a sensor or motor, and no statement of the text moves the robot."""
+    methods = {call.name.rpartition(".")[2] for each in code.statements for call in each.calls if "." in call.name}
+    is_moving = bool(methods & (LIMITED_MOVES | CONTINUOUS_MOVES))
+    return loop.keyword == "while" and loop.has_token(*PROPERTIES) and not is_moving
 
 
 def _suggest_loop_fix(loop: Statement, code: CodeStatements, fault: Fault) -> str:
@@ -97,6 +116,31 @@ def describe_large_amount(code: CodeStatements, statement: Statement, time_limit
         else:
             fix = f"For {number:g} degrees of the wheels write on_for_degrees, or {number / 360:g} rotations"
         return f"{call.name} takes {unit}, and {number:g} {unit} are too many. {fix}"
+    return ""
+
+
+def _describe_passed_amount(code: CodeStatements, listing: Listing, statement: Statement) -> str:
+    """Return a hint on a call that gives a function a much too large number for an amount; otherwise empty."""
+    head = next((each for each in code.list_enclosing(statement) if each.keyword == "def"), None)
+    parameters = (
+        [token for at, token in enumerate(head.tokens) if at > 2 and head.tokens[at - 1] in "(,"] if head else []
+    )
+    for call in statement.calls if head is not None else ():
+        usual_amount = AMOUNTS.get(call.name.rpartition(".")[2])
+        name = call.arguments[-1][0] if call.arguments and len(call.arguments[-1]) == 1 else ""
+        if usual_amount is None or head is None or name not in parameters:
+            continue
+        for caller in code.statements:
+            for outer in caller.calls if caller is not head else ():
+                place = parameters.index(name)
+                argument = outer.arguments[place] if len(outer.arguments) > place else ()
+                number = code.number(argument[2:] if argument[1:2] == ("=",) else argument) if argument else None
+                if outer.name == head.tokens[1] and number is not None and abs(number) >= usual_amount[0]:
+                    return (
+                        f"{listing.locate(caller.line)} gives {outer.name} {number:g} for {name}, and {number:g} "
+                        f"{usual_amount[1]} are too many. Check the order of the values: "
+                        f"{join_tokens(head.tokens)[4:-1]}"
+                    )
     return ""
 
 

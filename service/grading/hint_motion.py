@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from service.grading.findings import OtherTurn
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CallInCode, Statement, join_tokens
-from service.grading.hint_loops import describe_large_amount
+from service.grading.hint_loops import describe_large_amount, find_reading
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
-from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
+from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, READINGS
+from service.grading.judging.geometry import to_relative_position
 from submissions.criteria import Criterion
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose
@@ -22,6 +23,8 @@ from submissions.criteria.stopping import StopOn
 #: Criteria that fail if the robot does not stop in time.
 STOPPING_CRITERIA = (EndPose, StopOn)
 _IMMEDIATE_SECONDS = 0.5
+#: A smaller number of degrees moves a wheel by less than 5 mm.
+_MIN_DEGREES = 10
 
 
 def hint_about_stillness(clues: Clues) -> Iterator[str]:
@@ -107,10 +110,47 @@ def hint_about_units(clues: Clues) -> Iterator[str]:
         if amount_hint and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
             yield f"{listing.locate(statement.line)}: {amount_hint}"
             return
+        degrees_hint = _describe_small_degrees(listing, statement)
+        if degrees_hint and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
+            yield f"{listing.locate(statement.line)}: {degrees_hint}"
+            return
         range_hint = _describe_impossible_threshold(listing, statement)
         if range_hint:
             yield f"{listing.locate(statement.line)}: {range_hint}"
             return
+
+
+def hint_about_raw_light(clues: Clues) -> Iterator[str]:
+    """Yield a hint on raw light, 0 to 255, that is compared with a number for percent."""
+    if not any(isinstance(each, STOPPING_CRITERIA) for each in clues.lost):
+        return
+    for listing, statement in collect_statements(clues):
+        sign = next((at for at, token in enumerate(statement.condition) if token in ("<", ">", "<=", ">=")), None)
+        if statement.keyword not in ("while", "if") or sign is None:
+            continue
+        reading = find_reading(statement.condition[:sign], listing.code)
+        number = listing.code.number(statement.condition[sign + 1 :])
+        is_percent_used = any(each.has_token("reflected_light_intensity_pc") for each in listing.code.statements)
+        if reading != "reflected_light_intensity" or number is None or not 0 < number <= 100 or is_percent_used:
+            continue
+        yield (
+            f"{listing.locate(statement.line)} compares reflected_light_intensity with {number:g}: it goes from 0 to "
+            f"255. If {number:g} is in percent, write reflected_light_intensity_pc"
+        )
+        return
+
+
+def _describe_small_degrees(listing: Listing, statement: Statement) -> str:
+    """Return a hint on ``on_for_degrees`` with a number that can only be rotations; otherwise empty."""
+    for call in statement.calls:
+        amount = listing.code.number(call.arguments[-1]) if call.arguments else None
+        if call.name.rpartition(".")[2] != "on_for_degrees" or not amount or abs(amount) >= _MIN_DEGREES:
+            continue
+        return (
+            f"{call.name} takes degrees, and {amount:g}° of the wheels hardly move the robot. If you mean rotations, "
+            f"write on_for_rotations, or {360 * amount:g} degrees"
+        )
+    return ""
 
 
 def hint_about_distances(clues: Clues) -> Iterator[str]:
@@ -133,11 +173,32 @@ def hint_about_distances(clues: Clues) -> Iterator[str]:
             if failed_result is not None
             else ""
         )
+        missing_way = measure_missing_way(clues)
+        if missing_way is not None and 0 < missing_way < 10 * number:
+            yield (
+                f"{listing.locate(statement.line)} compares distance_centimeters with {number:g} centimetres, and the "
+                f"robot stopped {missing_way:.0f} mm too early. Go on until about {number - missing_way / 10:.2g}"
+            )
+            return
         yield (
             f"{listing.locate(statement.line)} compares distance_centimeters with {number:g}: that is in centimetres, "
             f"so {10 * number:g} mm. For {number:g} mm write "
             f"{number / 10:g}{'. ' if failure_message else ''}{failure_message.rstrip('.')}"
         )
+
+
+def measure_missing_way(clues: Clues) -> float | None:
+    """Return how far ahead of the robot's end the middle of the required zone is, in mm; None if it is not ahead."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, EndPose) or criterion.zone is None or not clues.recordings:
+            continue
+        left, bottom, right, top = criterion.zone
+        end = clues.recordings[0].end
+        if left <= end.x <= right and bottom <= end.y <= top:
+            return None
+        ahead, side = to_relative_position(end, (left + right) / 2, (bottom + top) / 2)
+        return ahead if ahead > 0 and abs(side) < (top - bottom + right - left) / 2 else None
+    return None
 
 
 def hint_about_turns(clues: Clues) -> Iterator[str]:
@@ -165,6 +226,28 @@ def hint_about_turns(clues: Clues) -> Iterator[str]:
 
 def _format_number(number: float) -> str:
     return f"{number:.0f}" if abs(number) >= 100 else f"{number:.3g}"
+
+
+def hint_about_missing_turn(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a program that should turn, and only drives with both wheels at the same speed."""
+    if not any(_find_required_turn(each) for each in clues.lost) or clues.is_stationary:
+        return
+    straight_moves = []
+    for listing, statement in collect_statements(clues):
+        for call in statement.calls:
+            method = call.name.rpartition(".")[2]
+            if "." not in call.name or method not in LIMITED_MOVES | CONTINUOUS_MOVES:
+                continue
+            if not call.name.startswith("tank_drive.") or call.arguments[0:1] != call.arguments[1:2]:
+                return
+            straight_moves.append((listing, statement, call))
+    if len(straight_moves) > 1:
+        listing, statement, call = straight_moves[-1]
+        amount = join_tokens(call.arguments[-1])
+        yield (
+            f"{listing.locate(statement.line)} drives straight on: both wheels have the same speed, and no line turns "
+            f"the robot. To turn on the spot, write tank_turn.on_for_rotations(-100, 20, {amount})"
+        )
 
 
 def hint_about_curves(clues: Clues) -> Iterator[str]:
@@ -206,29 +289,6 @@ def hint_about_speeds(clues: Clues) -> Iterator[str]:
                     "so the robot drives a curve. To drive straight on, give both the same speed"
                 )
                 return
-
-
-def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
-    """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
-    if clues.seconds <= _IMMEDIATE_SECONDS and not any(True for _ in clues.faults):
-        for sentence, condition in describe_skipped_loops(clues):
-            opposite = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
-            yield f"{sentence}, or write {opposite}"
-
-
-def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
-    """Yield the first sensor loop after the motors are switched on: why it ends immediately, and its condition."""
-    for listing, statement in collect_statements(clues):
-        reading = next((token for token in statement.condition if token in PROPERTIES), "")
-        is_driving = any(
-            has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
-        )
-        if statement.keyword == "while" and reading and is_driving:
-            unit = f" {reading} {READINGS[reading][2]}." if reading in READINGS else ""
-            condition = join_tokens(statement.condition)
-            reason = f"the loop ends at once, because {condition} is false from the start.{unit}"
-            yield f"{listing.locate(statement.line)}: {reason} Check the number", condition
-            return
 
 
 def _is_straight_required(criterion: object) -> bool:

@@ -19,7 +19,15 @@ _RIGHT = re.compile(r"""["']right["']|\bright(?:_\w*)?im(?:g|age)\w*|\bright_\w+
 _LEFT = re.compile(r"""["']left["']|\bleft(?:_\w*)?im(?:g|age)\w*|\bleft_\w+""")
 _DIVISION = re.compile(r"/\s*\(?\s*(?:max|255|\w+\.max|np\.|\w+)")
 _PREDICT_CALL = re.compile(r"\.predict\w*\(|class_predict")
+_CHANCE_AS_PLACE = re.compile(r"\bint\(.*\bmax\(|\[[^\]]*\bmax\(")
+_ARGMAX = re.compile(r"\bargmax\b|\.index\(")
+_NETWORK = re.compile(r"\bload(?:_onnx|_weights)?\(|\bMLPClassifier\(|\bcnn_load\(")
+_TURN = re.compile(r"\w\.T\b|\btranspose\(|\brot90\(|\bflip(?:lr|ud)?\(|\[::-1\]")
 _MAX_ACCURACY = 0.5
+_ASK = "Write names[int(network.predict(image)[0])] with your names for the list, the network and the image"
+_IMAGE = re.compile(r"IMG_DATA|[\"'](?:left|right)[\"']")
+#: A name from a list by a fixed number.
+_FIXED_NAME = re.compile(r"\b[^\W\d]\w*\[-?\d+\]\s*$")
 
 
 def hint_about_recognition(clues: Clues) -> Iterator[str]:
@@ -33,6 +41,7 @@ def hint_about_recognition(clues: Clues) -> Iterator[str]:
             hint = (
                 _hint_about_other_sensor(clues)
                 or _hint_about_label_order(answers, clues)
+                or _hint_about_turned_image(clues)
                 or _hint_about_constant_answer(answers, accuracy, clues)
             )
         else:
@@ -45,6 +54,20 @@ def hint_about_recognition(clues: Clues) -> Iterator[str]:
             return
 
 
+def hint_about_pixel_step(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``[::3]`` for the pixels of an image, which have four numbers each."""
+    for listing in clues.responders if clues.lost else ():
+        is_about_images = listing.find_line(_IMAGE) is not None
+        for statement in listing.code.statements if is_about_images else ():
+            tokens = statement.tokens
+            if any(tokens[at : at + 4] == (":", ":", "3", "]") for at in range(len(tokens) - 3)):
+                yield (
+                    f"{listing.locate(statement.line)} takes every third number, but each pixel has four: red, green, "
+                    "blue and alpha. Write 4 as the step, as in [::4]"
+                )
+                return
+
+
 def _hint_about_other_sensor(clues: Clues) -> str:
     """Return a hint on the line that uses the right sensor's image, if no line uses the left one's."""
     for listing in clues.responders:
@@ -53,6 +76,18 @@ def _hint_about_other_sensor(clues: Clues) -> str:
             return (
                 f"{listing.locate(line)} uses the right sensor's image, but the picture lies under the left sensor. "
                 f"Write left in place of right"
+            )
+    return ""
+
+
+def _hint_about_turned_image(clues: Clues) -> str:
+    """Return a hint on the line that turns or mirrors the image."""
+    for listing in clues.responders:
+        line = listing.find_line(_TURN)
+        if line is not None:
+            return (
+                f"{listing.locate(line)} turns or mirrors the image, and the network knows upright images. Leave it as "
+                "it is"
             )
     return ""
 
@@ -94,7 +129,7 @@ def _describe_labels_line(names: Sequence[str], clues: Clues) -> str:
 
 
 def _describe_prediction_line(clues: Clues) -> str:
-    return clues.describe_matching_line("responder", re.compile(r"\.predict\(|class_predict"))
+    return clues.describe_matching_line("responder", _PREDICT_CALL)
 
 
 def _has_prediction(clues: Clues) -> bool:
@@ -147,9 +182,18 @@ def _is_fit_call(call: CallInCode) -> bool:
 
 def _hint_about_constant_answer(answers: Mapping[str, str], accuracy: Accuracy, clues: Clues) -> str:
     """Return a hint if all images get the same name."""
-    if len(set(answers.values())) > 1 or len(answers) < 3 or not _has_prediction(clues):
+    if len(set(answers.values())) > 1 or len(answers) < 3:
         return ""
     answer = next(iter(answers.values()))
+    if not _has_prediction(clues):
+        has_network = any(listing.find_line(_NETWORK) for listing in clues.responders)
+        line = _describe_fixed_line(answer, clues) if has_network else ""
+        return line and f"{line}: every image is called {quote_text(answer)}, because no line asks the network. {_ASK}"
+    for listing in clues.responders:
+        chance_line = listing.find_line(_CHANCE_AS_PLACE)
+        if chance_line is not None and not any(each.find_line(_ARGMAX) for each in clues.responders):
+            fix = "max() is the largest chance, and not its place. Write argmax() in place of max()"
+            return f"{listing.locate(chance_line)}: every image is called {quote_text(answer)}. {fix}"
     is_normalised = any(each.find_line(_DIVISION) for each in clues.responders)
     fix = (
         "Print what you give to predict: it must be different for different images"
@@ -157,6 +201,16 @@ def _hint_about_constant_answer(answers: Mapping[str, str], accuracy: Accuracy, 
         else "The network is for numbers from 0 to 1: divide the image by its largest value"
     )
     return f"{_describe_prediction_line(clues)}: every image is called {quote_text(answer)}, whatever it shows. {fix}"
+
+
+def _describe_fixed_line(name: str, clues: Clues) -> str:
+    """Return the line that takes a name by a fixed number; otherwise the only one with the name; empty if unclear."""
+    for listing in clues.responders:
+        line = listing.find_line(_FIXED_NAME)
+        quoted = [n for n, text in enumerate(listing.lines, 1) if f'"{name}"' in text or f"'{name}'" in text]
+        if line is not None or len(quoted) == 1:
+            return listing.locate(quoted[0] if line is None else line)
+    return ""
 
 
 def _hint_about_unknown_label(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:

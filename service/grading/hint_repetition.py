@@ -70,11 +70,35 @@ def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
             return
 
 
+def hint_about_early_output(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a counter that is said or printed before it grows, so that each number is one too small."""
+    for criterion in clues.lost:
+        if not isinstance(criterion, WordSequence) or not criterion.words[0][0].isdecimal():
+            continue
+        texts = clues.spoken if criterion.source == "speech" else clues.printed
+        first_number = next((int(each) for each in texts if each.isdecimal()), None)
+        if first_number != int(criterion.words[0][0]) - 1:
+            continue
+        for listing, statement in collect_statements(clues):
+            following = listing.code.list_following(statement)[:1]
+            step = following[0] if following and following[0].parent == statement.parent else None
+            is_output = any(call.name in ("say", "print") for call in statement.calls)
+            if step is None or not is_output or not listing.code.list_enclosing_loops(statement):
+                continue
+            name = step.tokens[0]
+            if statement.has_token(name) and step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1")):
+                yield (
+                    f"{listing.locate(statement.line)} writes {name} before line {step.line} adds 1 to it, and begins "
+                    f"with {first_number}. Exchange the two lines, or begin with {first_number + 1}"
+                )
+                return
+
+
 def hint_about_last_number(clues: Clues) -> Iterator[str]:
     """Yield a hint on a count that ends one too early: ``< 10`` for ``<= 10``, ``range(5)`` for ``range(1, 6)``."""
     for criterion in clues.lost:
         numbers = _find_last_numbers(clues.find_finding(criterion, OtherWord))
-        if numbers is None or not isinstance(criterion, WordSequence):
+        if numbers is None or not isinstance(criterion, WordSequence) or any(hint_about_early_output(clues)):
             continue
         last_number, missing_number = numbers
         for listing, statement in collect_statements(clues):

@@ -31,8 +31,8 @@ def hint_about_signatures(clues: Clues) -> Iterator[str]:
         if fault.agent and fault.line is None and arguments:
             yield (
                 f"{listing.locate(head.line)} defines {name} with "
-                f"{_describe_parameter_count(len(_list_parameters(head)))}, but it is called with "
-                f'{len(arguments)}. Write "def {name}({", ".join(arguments)}):"'
+                f"{_describe_parameter_count(len(_list_parameters(head)))}, but {_describe_call(name, clues)} calls it "
+                f'with {len(arguments)}. Write "def {name}({", ".join(arguments)}):", or change the call'
             )
             return
         location = describe_fault_line(fault, clues)
@@ -69,6 +69,17 @@ def _list_arguments(name: str, clues: Clues) -> list[str]:
                     names = [one[0] if len(one) == 1 and is_name(one[0]) else "" for one in call.arguments]
                     return [text or f"value{number}" for number, text in enumerate(names, 1)]
     return []
+
+
+def _describe_call(name: str, clues: Clues) -> str:
+    """Return the line of the first call of a function."""
+    calls = (
+        listing.locate(statement.line)
+        for listing in clues.responder_process_listings
+        for statement in listing.code.statements
+        if any(call.name == name for call in statement.calls)
+    )
+    return next(calls, "another part")
 
 
 def _describe_parameter_count(number: int) -> str:

@@ -12,6 +12,12 @@ from service.grading.fault_kinds import FaultKind, is_kind
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CodeStatements, Statement, compute_bracket_depths, is_name, join_tokens
 from service.grading.hint_loops import find_reading
+from service.grading.hint_operands import (
+    check_decimal_comma,
+    check_number_as_text,
+    check_robot_number,
+    check_second_text,
+)
 from service.grading.hint_tables import READINGS
 from service.grading.hint_variables import (
     check_early_step,
@@ -309,6 +315,10 @@ _SLIP_CHECKS: Sequence[_SlipCheck] = (
     _check_missing_comma,
     _check_uncalled_function,
     _check_reading_as_text,
+    check_robot_number,
+    check_decimal_comma,
+    check_number_as_text,
+    check_second_text,
     _check_empty_range,
     _check_unused_value,
     _check_chained_ifs,

@@ -15,9 +15,12 @@ from service.grading.hint_tables import ACTIONS, CONTINUOUS_MOVES, LIMITED_MOVES
 from submissions.criteria.code import Functions
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.line import Follows, Laps
+from submissions.criteria.logs import Datalog
 from submissions.criteria.motion import Displacement, Encounters, Excursions, Moves
 from submissions.criteria.path import Visits
 from submissions.criteria.point import Circuits
+from submissions.criteria.sequence import WordSequence
+from submissions.criteria.texts import TextSequence
 
 #: Criteria that fail if the robot does not move.
 DRIVING_CRITERIA = (Circuits, Displacement, Drawing, Encounters, Excursions, Follows, Laps, Moves, Visits)
@@ -172,6 +175,28 @@ def hint_about_unindented_statement(clues: Clues) -> Iterator[str]:
                 "after it. If it belongs to the loop, indent it like the lines above"
             )
             return
+
+
+def hint_about_output_below_loop(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a text with a loop's value that is said or printed once, below the loop, and not in it."""
+    if not any(isinstance(each, WordSequence | TextSequence | Datalog) for each in clues.lost):
+        return
+    for listing, statement in collect_statements(clues):
+        following = listing.code.find_next_outside(statement) if statement.keyword == "while" else None
+        if following is None or following.indent != statement.indent or not _is_output(following):
+            continue
+        body = listing.code.list_body(statement)
+        names = {name for each in body for name in each.bound_names}
+        if following.has_token(*names) and not any(map(_is_output, body)):
+            yield (
+                f"{listing.locate(following.line)} is below the loop of line {statement.line}, so it runs only once, "
+                "after it. Move it into the loop: indent it like the lines above, before the value changes"
+            )
+            return
+
+
+def _is_output(statement: Statement) -> bool:
+    return any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls)
 
 
 def collect_statements(clues: Clues) -> Iterator[tuple[Listing, Statement]]:

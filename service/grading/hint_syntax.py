@@ -1,22 +1,46 @@
-"""Advice on lines that Python cannot parse: ``else if``, missing or unclosed quotes, missing indentation.
+"""Advice on lines that Python cannot parse: missing quotes, brackets or indentation, wrong signs, copied line numbers.
 
 Such texts are not fully split into statements, so the lines are searched.
 """
 
 from __future__ import annotations
 
+import io
+import itertools
+import keyword
 import re
+import tokenize
+from collections.abc import Iterator
 
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Statement
+from service.grading.hint_code import Statement, is_name
+from service.grading.hint_tables import ACTIONS
 from sim.recording import Fault
 
 _ELSE_IF = re.compile(r"\s*(else\s+if|else?if|elsif|elf)\b")
+_EMPTY_CONDITION = re.compile(r"\s*(elif|if|while)\s*:")
+_ELSE_CONDITION = re.compile(r"\s*else\s+([^:#]+?)\s*:")
+_SECOND_STATEMENT = re.compile(
+    r"\s*[^\W\d][\w.]*\s*(?:[-+*/]?=\s*[\w.\"']+|\([^()]*\))\s+(while|def|import|print|say|return|tank_drive|tank_turn)\b"
+)
 _WORDS = re.compile(r"\b(say|print|speak)\(\s*([^\W\d]\w*(?:[ ]+[\w!?.]+)+)\s*(?=[,)])")
 _NO_TEXT = re.compile(r"\b(?:and|or|not|if|else|for|in|is|lambda|f)\b")
 _KEYWORD_ARGUMENT = re.compile(r",\s*\w+\s*=\s*\w+\s*\)*\s*$")
 _INDENT_WIDTH = 4
+_TEXTS = re.compile(r"""(["']).*?\1""")
+#: A call of an action whose values follow without brackets.
+_UNBRACKETED_CALL = re.compile(
+    rf"(?P<name>say|print|speak|(?:[^\W\d]\w*\.)+(?:{'|'.join(sorted(ACTIONS))}))\s+(?P<values>[\w\"'(-][^#]*)"
+)
+#: Misspelt comparison signs that are no Python, with the right ones.
+_SIGNS = {"=>": ">=", "=<": "<=", "=!": "!=", "<>": "!=", "> =": ">=", "< =": "<=", "! =": "!=", "= =": "=="}
+_SIGN = re.compile(r"=>|=<|=!(?!=)|<>|[<>!=] =")
+_NUMBER_WITH_UNIT = re.compile(
+    r"\b(\d+(?:\.\d+)?)[ ]*(%|°|cm|mm|ms|s|sec|seconds?|deg|degrees?|rotations?)[ ]*(?=[,)]|$)"
+)
+_UNQUOTED_PREFIX = re.compile(r"\b(?:PY|IMG_DATA|JSON)::\w*")
+_LINE_NUMBER = re.compile(r"\s*(\d+)[.):|]?\s+[^\W\d]")
 
 
 def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
@@ -26,11 +50,78 @@ def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statem
         return ""
     line = "".join(listing.lines[fault.line - 1 : fault.line])
     return (
-        _advise_on_else_if(line)
+        _advise_on_copied_signs(line)
+        or _advise_on_else_if(line)
+        or _advise_on_branch(line)
         or _advise_on_indentation(fault, listing, line)
         or _advise_on_unclosed_text(fault, line)
+        or _advise_on_call_without_brackets(line)
+        or _advise_on_comparison_sign(line)
+        or _advise_on_unit(line)
+        or _advise_on_unquoted_prefix(line)
         or _advise_on_unquoted_words(line, listing)
+        or _advise_on_missing_plus(line)
     )
+
+
+def _advise_on_copied_signs(line: str) -> str:
+    """Return advice on signs that were copied with the program: Markdown fences, and line numbers."""
+    if line.lstrip().startswith("```"):
+        return "``` marks code in a chat or a document, and is no Python. Delete each line that begins with ```."
+    match = _LINE_NUMBER.match(line)
+    if match is None:
+        return ""
+    return f"{match[1]} at the start is a line number, and no Python. Delete the numbers at the start of the lines."
+
+
+def _advise_on_call_without_brackets(line: str) -> str:
+    match = _UNBRACKETED_CALL.fullmatch(line.strip())
+    if match is None or match["values"].startswith("("):
+        return ""
+    values = match["values"].rstrip()
+    first_word = re.match(r"\w*", values)
+    if first_word is not None and keyword.iskeyword(first_word[0]):
+        return ""
+    return f"A call needs brackets: write {match['name']}({values})."
+
+
+def _advise_on_comparison_sign(line: str) -> str:
+    match = _SIGN.search(_TEXTS.sub('""', line))
+    return f"Python has no sign {match[0]}. Write {_SIGNS[match[0]]}." if match is not None else ""
+
+
+def _advise_on_unit(line: str) -> str:
+    """Return advice on ``50%`` or ``2 s``, where only a number can stand."""
+    match = _NUMBER_WITH_UNIT.search(_TEXTS.sub('""', line))
+    return f"A number has no unit in Python: write {match[1]} in place of {match[0].strip()}." if match else ""
+
+
+def _advise_on_unquoted_prefix(line: str) -> str:
+    match = _UNQUOTED_PREFIX.search(line)
+    if match is None or _UNQUOTED_PREFIX.search(_TEXTS.sub('""', line)) is None:
+        return ""
+    fixed_line = f'{line[: match.start()]}"{match[0]}"{line[match.end() :]}'
+    return f"{match[0]} is a text and needs quotes: write {fixed_line.strip()}."
+
+
+def _advise_on_missing_plus(line: str) -> str:
+    """Return advice on a text and a value with no sign between them."""
+    tokens = list(_split_line(line))
+    for (first_type, first), (second_type, second) in itertools.pairwise(tokens):
+        is_after_text = first_type == tokenize.STRING and second_type in (tokenize.NAME, tokenize.NUMBER)
+        is_before_text = second_type == tokenize.STRING and (is_name(first) or first in (")", "]"))
+        if (is_after_text or is_before_text) and not {first, second} & set(keyword.kwlist):
+            return f"There is no sign between {first} and {second}. To join texts, write + between them."
+    return ""
+
+
+def _split_line(line: str) -> Iterator[tuple[int, str]]:
+    """Yield type and text of the tokens of a line, up to the first that cannot be read."""
+    try:
+        for token in tokenize.generate_tokens(io.StringIO(line.strip()).readline):
+            yield token.type, token.string
+    except (tokenize.TokenError, SyntaxError):
+        return
 
 
 def _advise_on_else_if(line: str) -> str:
@@ -39,6 +130,19 @@ def _advise_on_else_if(line: str) -> str:
         return ""
     keyword = " ".join(match[1].split())
     return f"Python has no {keyword}. Write elif in place of {keyword}."
+
+
+def _advise_on_branch(line: str) -> str:
+    """Return advice on ``elif:`` without a condition, ``else`` with one, and a second statement in a line."""
+    empty_match = _EMPTY_CONDITION.match(line)
+    if empty_match is not None:
+        fix = " For all other cases write else:" if empty_match[1] == "elif" else ""
+        return f"{empty_match[1]} needs a condition before the colon.{fix}"
+    else_match = _ELSE_CONDITION.match(line)
+    if else_match is not None:
+        return f"else has no condition: write else: alone, or elif {else_match[1].strip()}:"
+    second_match = _SECOND_STATEMENT.match(_TEXTS.sub('""', line))
+    return f"A new statement begins at {second_match[1]}: write it in a line of its own." if second_match else ""
 
 
 def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:

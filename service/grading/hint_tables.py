@@ -37,6 +37,8 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (r"^(?:IndentationError|TabError)", "Start the lines of one block with the same number of blanks; no tabs."),
         (r"^SyntaxError: invalid character '[\u2018-\u201f]", "Type straight quotes, as they are on the keyboard."),
+        (r"^SyntaxError: invalid character '[\u2010-\u2015\u2212]", "Type the minus sign of the keyboard: -"),
+        (r"^SyntaxError: invalid non-printable character", "A blank was copied with the text. Delete it, and type it."),
         (r"^SyntaxError.*\n\s*(>>>|\.\.\. )", "\\g<1> is Python's prompt: delete it at the start of each line."),
         (
             r"^SyntaxError.*\n\s*((?:In|Out) ?\[[ \d]*\]:)",
@@ -115,6 +117,14 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             r"^TypeError: string indices must be integers",
             "It is a text and has no keys: send an object from the responder, as json.dumps makes it, only once.",
         ),
+        (
+            r"^TypeError: type '(\w+)' is not subscriptable",
+            "\\g<1> is called with round brackets: write \\g<1>(...).",
+        ),
+        (
+            r"^TypeError: '\w*function\w*' object is not subscriptable\n.*\b(say|print|sleep|len|round|abs)\[",
+            "\\g<1> is called with round brackets: write \\g<1>(...).",
+        ),
         (r"^TypeError: '\w*function\w*' object is not subscriptable\n.*\b(\w+)\[", "Call it first: \\g<1>()[...]."),
         (r"^TypeError: 'method' object is not subscriptable\n.*\b(\w+)\[", "Call it with round brackets: \\g<1>(...)."),
         (
@@ -128,6 +138,26 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (
             r"^(?:TypeError|AttributeError): .*'\w*(?:function|method)\w*'",
             "A function or method is named without brackets: add () to call it.",
+        ),
+        (
+            r"^AttributeError: 'dict' object has no attribute '(?:split|strip|removeprefix|replace|startswith|lower)'",
+            'It is an object and no text: give one of its values, such as image["left"].',
+        ),
+        (
+            r"^AttributeError: 'dict' object has no attribute '(?:append|add)'",
+            "An object has keys: to add a value, write object[key] = value.",
+        ),
+        (
+            r"^AttributeError: '(?:list|tuple)' object has no attribute '(?:split|strip|removeprefix|startswith)'",
+            "It is a list and no text: take one entry, for example the last one with [-1].",
+        ),
+        (
+            r"^AttributeError: '(int|float)' object has no attribute",
+            "It is a number. To use it as a text, write str(...) around it.",
+        ),
+        (
+            r"(\S+\.onnx) cannot be loaded as a model",
+            'For an .onnx file write load_onnx("\\g<1>"), with from nn_tools import load_onnx above.',
         ),
         (r"^AttributeError: 'dict' object has no attribute '(\w+)'", 'Write ["\\g<1>"] to take a key of an object.'),
         (r"^AttributeError: 'str' object has no attribute 'append'", "It is a text: add to it with +."),
@@ -193,21 +223,53 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"^ModuleNotFoundError", "Check its spelling, or submit the module's file beside your program."),
         (r"^ValueError: negative seconds|sleep length must be non-negative", "Wait for 0 seconds or more."),
         (r"^RecursionError", "A function calls itself without end: use a loop, or return before it calls itself."),
-        (r"^NameError: name '(\w+)'", "Assign a value to \\g<1> above this line, or correct its spelling."),
+        (
+            r"^NameError: name '(\w+)'",
+            "Assign a value to \\g<1> above this line, or correct its spelling. If it is a text, put it in quotes.",
+        ),
+        (
+            r"^TypeError: bad operand type for unary -: 'SpeedPercent'",
+            "Write the minus in the brackets, before the number: SpeedPercent(-40).",
+        ),
+        (
+            r"^TypeError: unsupported operand type\(s\) .*'SpeedPercent'",
+            "Calculate in the brackets: SpeedPercent(speed + steering).",
+        ),
+        (
+            r"^AttributeError: 'ColorSensor' object has no attribute",
+            "Write reflected_light_intensity_pc for the light in percent, or color, color_name or rgb for the colour.",
+        ),
+        (
+            r"^AttributeError: 'UltrasonicSensor' object has no attribute",
+            "Write distance_centimeters for the distance.",
+        ),
+        (r"^AttributeError: 'GyroSensor' object has no attribute", "Write angle for the direction in degrees."),
+        (
+            r"^AttributeError: 'Move(?:Tank|Steering)' object has no attribute '(?:position|speed|degrees|rotations)'",
+            "Each motor has its own: write tank_drive.left_motor.position, in degrees.",
+        ),
+        (
+            r"^AttributeError: 'Move(?:Tank|Steering)' object has no attribute",
+            "It has on, off, on_for_seconds, on_for_rotations and on_for_degrees.",
+        ),
+        (
+            r"^AttributeError: 'LargeMotor' object has no attribute",
+            "A motor has position, in degrees, and speed.",
+        ),
+        (
+            r"^ValueError: Expected 2D array, got scalar array",
+            "predict got a text or one number. Make an array of the image's pixels first, then .reshape(1, -1).",
+        ),
+        (
+            r"invalid literal for int\(\) with base 10: '::?\s*-?\d",
+            'The text still begins with a colon. Take all of the beginning off: text.removeprefix("PY::").',
+        ),
         (
             r"invalid literal for int\(\) with base 10: '[^']*\d[^']*'",
             "The text contains more than the number: send the number alone, or remove the other words before int().",
         ),
         (r"'list' object has no attribute '(?:add|push|insert_end)'", "To add a value to a list, write append(...)."),
         (r"module 'math' has no attribute 'PI'", "Did you mean math.pi?"),
-        (
-            r"inconsistent numbers of samples: \[(\d+), (\d+)\]",
-            r"There are \g<1> images and \g<2> labels: repeat the labels in the same way as the images.",
-        ),
-        (
-            r"did not contain a loop with signature matching types \(dtype\('<U",
-            "The labels are texts: use a classifier, such as MLPClassifier, and no regressor.",
-        ),
     )
 )
 

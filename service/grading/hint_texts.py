@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from responders.message_format import classify_text
 from service.grading.hint_clues import Clues
+from service.grading.hint_differences import advise_on_difference
 from service.grading.judging.message_parts import quote_text
 from sim.recording import Verdict
 from submissions.criteria import Criterion
@@ -86,9 +87,11 @@ def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterato
             similar_text = next((text for text in unexpected_texts[:_MAX_TEXTS] if is_near(expected_text, text)), None)
             if similar_text is not None:
                 position = {"equals": "", "starts_with": " at its start"}.get(expected_text.how, " in it")
+                is_whole = expected_text.how == "equals"
+                advice = advise_on_difference(expected_text.text, similar_text) if is_whole else ""
                 yield (
                     f"{describe_quoting_line(clues, part, similar_text)} {verb} {quote_text(similar_text)}; expected "
-                    f"{quote_text(expected_text.text)}{position}"
+                    f"{quote_text(expected_text.text)}{position}{advice and '. '}{advice}"
                 )
                 break
 

@@ -117,7 +117,14 @@ def check_unreachable_if(listing: Listing, statement: Statement) -> str:
                 return ""
             continue
         body, earlier_conjuncts = code.list_body(earlier_statement), _parse_conjuncts(earlier_statement)
+        alternatives = _parse_comparisons(earlier_statement, "or")
         is_exit = bool(body) and body[-1].parent == earlier_statement.number and body[-1].keyword in _EXIT_KEYWORDS
+        if (in_chain or is_exit) and any(_implies(one, other) for one in conjuncts for other in alternatives[1:]):
+            return (
+                f"{listing.locate(statement.line)} is never true: line {earlier_statement.line} has already found that "
+                f"{join_tokens(earlier_statement.condition)}. Remove what line {statement.line} asks from line "
+                f"{earlier_statement.line}, or move line {statement.line} above it"
+            )
         if (
             (in_chain or is_exit)
             and earlier_conjuncts
@@ -138,11 +145,16 @@ _Comparison = tuple[str, str, str]
 
 def _parse_conjuncts(statement: Statement) -> list[_Comparison]:
     """Return the name comparisons that ``and`` joins in a condition. Empty if it contains anything else."""
+    return _parse_comparisons(statement, "and")
+
+
+def _parse_comparisons(statement: Statement, word: str) -> list[_Comparison]:
+    """Return the name comparisons that ``word`` joins in a condition. Empty if it contains anything else."""
     if statement.keyword not in ("if", "elif"):
         return []
     parts: list[tuple[str, ...]] = [()]
     for token in statement.condition:
-        parts = [*parts, ()] if token == "and" else [*parts[:-1], (*parts[-1], token)]
+        parts = [*parts, ()] if token == word else [*parts[:-1], (*parts[-1], token)]
     comparisons = [
         (each[0], each[1], each[2]) for each in parts if len(each) == 3 and is_name(each[0]) and each[1] in _SIGNS
     ]

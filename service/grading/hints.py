@@ -8,24 +8,26 @@ words, or missing keys.
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Callable, Iterator, Sequence
 
-from responders.message_format import JSON
 from service.grading.grade import CriterionResult, TrialResult
+from service.grading.hint_accepted import hint_about_missing_keys, hint_about_other_words
+from service.grading.hint_agents import hint_about_silent_agent, hint_about_text_of_agent, hint_about_unasked_agent
 from service.grading.hint_answers import (
     hint_about_answer_values,
     hint_about_image_command,
     hint_about_missing_key,
     hint_about_none_answers,
     hint_about_other_keys,
+    hint_about_quoted_object,
+    hint_about_returned_pair,
     hint_about_shifted_numbers,
     hint_about_swapped_values,
     hint_about_text_numbers,
 )
 from service.grading.hint_braces import hint_about_braces
 from service.grading.hint_cause_lines import hint_about_cause_line
-from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues, collect_clues
+from service.grading.hint_clues import Clues, collect_clues
 from service.grading.hint_counterfactuals import hint_about_wrong_number
 from service.grading.hint_errors import hint_about_cell_errors, hint_about_errors, hint_about_failed_cell
 from service.grading.hint_failure_lines import hint_about_failure_line, hint_about_unentered_loop
@@ -37,8 +39,6 @@ from service.grading.hint_files import (
     hint_about_swapped_parts,
 )
 from service.grading.hint_formats import (
-    RETURN_LINE,
-    describe_return_line,
     hint_about_answers,
     hint_about_empty_parts,
     hint_about_image_log,
@@ -57,6 +57,7 @@ from service.grading.hint_formulas import (
 )
 from service.grading.hint_functions import (
     hint_about_functions,
+    hint_about_hidden_prefix,
     hint_about_missing_return,
     hint_about_narrow_except,
     hint_about_returned_values,
@@ -64,6 +65,7 @@ from service.grading.hint_functions import (
 from service.grading.hint_logic import (
     hint_about_first_message,
     hint_about_first_value,
+    hint_about_large_step,
     hint_about_mirrored_end,
     hint_about_missing_reverse,
     hint_about_range_start,
@@ -75,14 +77,25 @@ from service.grading.hint_loops import hint_about_limits
 from service.grading.hint_motion import (
     hint_about_curves,
     hint_about_distances,
-    hint_about_skipped_loop,
+    hint_about_missing_turn,
+    hint_about_raw_light,
     hint_about_speeds,
     hint_about_stillness,
     hint_about_turns,
     hint_about_units,
 )
-from service.grading.hint_recognition import hint_about_recognition
+from service.grading.hint_outputs import hint_about_missing_else, hint_about_printed_object, hint_about_swapped_sides
+from service.grading.hint_passes import (
+    hint_about_added_factor,
+    hint_about_hasty_resending,
+    hint_about_kept_value,
+    hint_about_short_loop,
+    hint_about_stale_twin,
+    hint_about_zero_pass,
+)
+from service.grading.hint_recognition import hint_about_pixel_step, hint_about_recognition
 from service.grading.hint_repetition import (
+    hint_about_early_output,
     hint_about_exact_reading,
     hint_about_inner_loop,
     hint_about_last_number,
@@ -90,6 +103,7 @@ from service.grading.hint_repetition import (
     hint_about_single_reaction,
 )
 from service.grading.hint_responder import (
+    hint_about_called_responder,
     hint_about_double_json,
     hint_about_misnamed_function,
     hint_about_missing_responder,
@@ -100,11 +114,14 @@ from service.grading.hint_responder import (
     hint_about_unreturned_answers,
     hint_about_wrong_prefix,
 )
+from service.grading.hint_scale import hint_about_raw_report, hint_about_wrong_scale
 from service.grading.hint_signatures import hint_about_signatures
+from service.grading.hint_skipped_loops import hint_about_skipped_loop
 from service.grading.hint_slips import hint_about_missing_comma, hint_about_slips
 from service.grading.hint_structure import (
     hint_about_discarded_value,
     hint_about_missing_brackets,
+    hint_about_output_below_loop,
     hint_about_replaced_function,
     hint_about_single_reading,
     hint_about_stop_in_loop,
@@ -112,13 +129,10 @@ from service.grading.hint_structure import (
     hint_about_unindented_statement,
 )
 from service.grading.hint_texts import (
-    ExpectedText,
-    describe_quoting_line,
     hint_about_missing_series,
     hint_about_sent_texts,
     hint_about_texts,
     hint_about_unspoken_text,
-    is_near,
 )
 from service.grading.hint_thresholds import hint_about_joined_colours, hint_about_thresholds
 from service.grading.hint_timing import hint_about_overlapping_speech, hint_about_rare_readings, hint_about_short_waits
@@ -132,9 +146,8 @@ from service.grading.hint_values import (
     hint_about_unused_value,
 )
 from service.grading.judging.limited_judging import collect_within_limits
-from service.grading.judging.message_parts import quote_text
 from service.grading.run_plan import RunPlan
-from submissions.submission import Part, Submission
+from submissions.submission import Submission
 
 _log = logging.getLogger(__name__)
 
@@ -190,13 +203,33 @@ _STRUCTURE_RULES: Sequence[Rule] = (
     hint_about_skipped_loop,
     hint_about_discarded_value,
     hint_about_unindented_statement,
+    hint_about_output_below_loop,
+    hint_about_stale_twin,
+    hint_about_kept_value,
 )
 _RESULT_RULES: Sequence[Rule] = (
+    hint_about_silent_agent,
+    hint_about_unasked_agent,
+    hint_about_text_of_agent,
+    hint_about_printed_object,
+    hint_about_missing_else,
+    hint_about_swapped_sides,
+    hint_about_returned_pair,
+    hint_about_quoted_object,
+    hint_about_large_step,
+    hint_about_raw_light,
+    hint_about_raw_report,
+    hint_about_wrong_scale,
+    hint_about_pixel_step,
+    hint_about_hasty_resending,
+    hint_about_zero_pass,
+    hint_about_added_factor,
     hint_about_spoken_name,
     hint_about_first_message,
     hint_about_overlapping_speech,
     hint_about_short_waits,
     hint_about_functions,
+    hint_about_hidden_prefix,
     hint_about_division,
     hint_about_image_command,
     hint_about_none_answers,
@@ -208,6 +241,7 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_about_recognition,
     hint_about_units,
     hint_about_turns,
+    hint_about_missing_turn,
     hint_about_curves,
     hint_about_speeds,
     hint_about_distances,
@@ -230,9 +264,11 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_about_repeated_words,
     hint_about_inner_loop,
     hint_about_last_number,
+    hint_about_early_output,
     hint_about_exact_reading,
     hint_about_few_samples,
     hint_about_few_images,
+    hint_about_short_loop,
     hint_about_single_reaction,
     hint_about_unused_value,
 )
@@ -248,9 +284,6 @@ _FALLBACK_RULES: Sequence[Rule] = (
     hint_about_failure_line,
     hint_about_cause_line,
 )
-_QUOTED = re.compile(r'"([^"]{6,60})"')
-_KEY = re.compile(r'"(\w+)"\s*:')
-_VARIABLE_TEXT = re.compile(r"\d|[{}<>:]")
 
 
 def collect_hints(
@@ -320,53 +353,4 @@ def _apply_rule(rule: Rule, clues: Clues) -> tuple[str, ...]:
 
 def collect_accepted_differences(clues: Clues) -> tuple[str, ...]:
     """Return one sentence each on words and on keys that differ from the description. Empty if none do."""
-    return _apply_rules((_hint_about_other_words, _hint_about_missing_keys), clues)
-
-
-def _hint_about_other_words(clues: Clues) -> Iterator[str]:
-    texts: Sequence[tuple[Part, str, Sequence[str]]] = (
-        ("program", "says", clues.spoken),
-        ("program", "prints", clues.printed),
-        ("responder", "answers", clues.answers),
-    )
-    for quotation in _QUOTED.findall(_join_task_lines(clues)):
-        opening = quotation.partition("...")[0].strip()
-        if len(opening.split()) < 2 or _VARIABLE_TEXT.search(opening):
-            continue
-        expected = ExpectedText(opening, "contains")
-        if any(expected.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
-            continue
-        for part, verb, part_texts in texts:
-            similar_text = next((text for text in part_texts if is_near(expected, text)), None)
-            if similar_text is not None:
-                location = describe_quoting_line(clues, part, similar_text)
-                yield f"{location} {verb} {quote_text(similar_text)}; the assignment asks for {quote_text(opening)}"
-                return
-
-
-def _hint_about_missing_keys(clues: Clues) -> Iterator[str]:
-    required_keys = list(
-        dict.fromkeys(key for form in _extract_json_objects(_join_task_lines(clues)) for key in _KEY.findall(form))
-    )
-    answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < MAX_TEXT_LENGTH]
-    answer_keys = {key for text in answers for key in _KEY.findall(text)}
-    missing_keys = [key for key in required_keys if key not in answer_keys]
-    if missing_keys and answer_keys:
-        location = describe_return_line(answers[0], clues, RETURN_LINE)
-        keys = " and ".join(map(quote_text, missing_keys[:3]))
-        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
-
-
-def _join_task_lines(clues: Clues) -> str:
-    return " ".join(clues.task.split())
-
-
-def _extract_json_objects(task: str) -> Iterator[str]:
-    """Yield each object after ``JSON::``, up to its closing bracket."""
-    for piece in task.split(JSON)[1:]:
-        depth = 0
-        for index, letter in enumerate(piece):
-            depth += (letter == "{") - (letter == "}")
-            if depth == 0:
-                yield piece[: index + 1]
-                break
+    return _apply_rules((hint_about_other_words, hint_about_missing_keys, hint_about_called_responder), clues)

@@ -81,6 +81,10 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunne
         ),
         ("%run other.py", "cell 2, line 1: FileNotFoundError: there is no file other.py beside the notebook"),
         ("%%nonsense\nhello", "cell 2, line 1: %%nonsense was skipped"),
+        (
+            "%%seqdiagram\n{ a -> b; }",
+            "cell 2, line 1: %%seqdiagram was skipped: it is not known here; did you mean %%seqdiag?",
+        ),
         ("1 +", "cell 2, line 1: SyntaxError: invalid syntax; the other cells were run all the same"),
         ("\n\nopen('/etc/passwd')", "cell 2, line 3: programs here may only open files in their own folder"),
         ("raise SystemExit('no')", "cell 2, line 1: SystemExit: no"),

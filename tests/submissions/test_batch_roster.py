@@ -116,7 +116,7 @@ def test_a_row_with_an_assignment_of_its_own_keeps_it(folder: Path) -> None:
 @pytest.mark.parametrize("time", ["0001-01-01T00:00+05:00", "9999-12-31T23:59-05:00", "soon"])
 def test_an_impossible_time_costs_one_row(folder: Path, time: str) -> None:
     rows = f"student,file,submitted_at\nada,a,{time}\nbob,b,2026-11-30 17:00\n"
-    contents = read_batch(_roster(folder, rows), "echo-responder")
+    contents = read_named_batch(_roster(folder, rows), "echo-responder")
     assert [request.submission.student for request in contents.grading_requests] == ["bob"]
     assert [refusal.source for refusal in contents.refusals] == ["line 2: ada"]
     assert "expected a moment like" in contents.refusals[0].reason

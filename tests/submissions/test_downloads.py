@@ -221,7 +221,7 @@ def test_a_list_that_would_grow_or_act_does_neither(tmp_path: Path, text: str) -
 def test_a_time_that_is_no_text_is_not_written_out(tmp_path: Path) -> None:
     text = f"{BOMB}submission_1:\n  :submitters:\n  - :name: Ada\n  :created_at: *a39\n"
     folder = laid(tmp_path / "export", {"submission_metadata.yml": text, **under("submission_1/")})
-    (request,) = read_batch(folder, ASSIGNMENT).grading_requests
+    (request,) = read_named_batch(folder, ASSIGNMENT).grading_requests
     assert request.submitted_at is None
 
 
@@ -231,7 +231,7 @@ def test_a_student_with_an_impossible_time_keeps_nobody_out(tmp_path: Path, time
         **under("submitted/s1/echo-responder/", {**BOTH, "timestamp.txt": time}),
         **under("submitted/s2/echo-responder/"),
     }
-    contents = read_batch(laid(tmp_path, files) / "submitted", ASSIGNMENT)
+    contents = read_named_batch(laid(tmp_path, files) / "submitted", ASSIGNMENT)
     assert [request.submitted_at for request in contents.grading_requests] == [None, None]
 
 

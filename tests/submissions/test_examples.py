@@ -11,12 +11,16 @@ import pytest
 
 from paths import DATA
 from service.grading import (
+    hint_agents,
     hint_answers,
     hint_braces,
     hint_files,
     hint_formulas,
     hint_logic,
+    hint_outputs,
+    hint_passes,
     hint_repetition,
+    hint_scale,
     hint_signatures,
     hint_slips,
     hint_structure,
@@ -95,6 +99,7 @@ def assert_as_expected(result: Grade, wanted: ExpectedResult) -> None:
 def rules_that_prove() -> Iterator[Rule]:
     """Return the rules that must report nothing for a correct program, even if marks are lost."""
     modules = (
+        hint_agents,
         hint_answers,
         hint_braces,
         hint_files,
@@ -103,6 +108,9 @@ def rules_that_prove() -> Iterator[Rule]:
         hint_signatures,
         hint_slips,
         hint_logic,
+        hint_outputs,
+        hint_passes,
+        hint_scale,
         hint_structure,
         hint_thresholds,
         hint_timing,

@@ -89,7 +89,9 @@ def test_names_that_cannot_be_kept_are_refused_with_what_to_do(name: str) -> Non
 
 def test_a_character_that_a_notebook_splits_is_read_back() -> None:
     lines = ["%%sim_magic_preloaded\n", "print('\ud83e", "\udd16')"]
-    cells = [{"cell_type": "code", "source": source, "metadata": {}} for source in (lines, "".join(lines))]
+    cells: list[dict[str, object]] = [
+        {"cell_type": "code", "source": source, "metadata": {}} for source in (lines, "".join(lines))
+    ]
     split, whole = (read_notebook(json.dumps({"cells": [cell]}).encode(), "a.ipynb").notebook for cell in cells)
     assert split == whole
     assert read_notebook(pack_notebook(split), "a.ipynb").notebook == split

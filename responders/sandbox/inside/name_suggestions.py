@@ -26,6 +26,8 @@ _IMPORTS = {
     "pyState": "from ev3dev2_glue import pyState",
     "load": "from joblib import load",
 }
+#: Builtins of an interactive Python, which no program means.
+_INTERACTIVE_NAMES = frozenset({"copyright", "credits", "license", "exit", "quit", "help"})
 #: Functions of modules by their names in other languages and libraries.
 _FOREIGN_NAMES = {
     "time": {"wait": "sleep", "pause": "sleep", "delay": "sleep", "now": "time"},
@@ -68,7 +70,7 @@ def _suggest_for_name(error: NameError) -> str:
     statement = f"import {name}" if name in sys.stdlib_module_names else _IMPORTS.get(name)
     if statement is not None:
         return f"Did you forget {statement}?"
-    known_names: list[str] = [*dir(builtins), *keyword.kwlist]
+    known_names: list[str] = [each for each in (*dir(builtins), *keyword.kwlist) if each not in _INTERACTIVE_NAMES]
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

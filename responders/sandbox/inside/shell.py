@@ -5,6 +5,7 @@ Magics that start the robot only forward their arguments. The worker does the re
 
 from __future__ import annotations
 
+import difflib
 import os
 import shlex
 from collections.abc import Callable, Mapping
@@ -29,6 +30,7 @@ _IGNORED_MAGICS = frozenset(
 _PROGRAM_MAGICS = frozenset(
     ("bash", "sh", "script", "sx", "system", "cmd", "perl", "ruby", "python", "python2", "python3", "pypy", "R")
 )
+_MIN_SIMILARITY = 0.7
 _PACKAGE_MAGICS = frozenset(("pip", "pip3", "conda", "mamba"))
 _PACKAGE_MESSAGE = f"packages cannot be installed here; {libraries.LIBRARY_DESCRIPTION} are there"
 
@@ -161,7 +163,9 @@ class Shell:
         elif name in _PACKAGE_MAGICS:
             self._requester.note(f"{line} was refused: {_PACKAGE_MESSAGE}")
         elif name not in _IGNORED_MAGICS:
-            self._requester.note(f"{_shorten_line(line)} was skipped: it is not known here")
+            similar_names = difflib.get_close_matches(name, (*_DIAGRAM_MAGICS, *_ROBOT_MAGICS), 1, _MIN_SIMILARITY)
+            question = f"; did you mean %%{similar_names[0]}?" if similar_names else ""
+            self._requester.note(f"{_shorten_line(line)} was skipped: it is not known here{question}")
 
     def _print_files(self, line: str) -> None:
         for name in _split_words(line):

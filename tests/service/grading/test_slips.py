@@ -9,9 +9,16 @@ from pathlib import Path
 import pytest
 
 from paths import ROOT
-from service.grading.hint_clues import Listing
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_loops import describe_discarded_value
+from service.grading.hint_passes import hint_about_kept_value, hint_about_stale_twin, hint_about_zero_pass
+from service.grading.hint_skipped_loops import describe_unbracketed_not
 from service.grading.hint_slips import collect_slips
+from submissions.criteria import Criterion
+from submissions.criteria.motion import Excursions
+
+LOST = Excursions.model_construct(id="out", check="excursions", heights=(1.0,))
 
 
 def listing(text: str, name: str = "robot.py") -> Listing:
@@ -62,7 +69,16 @@ def test_there_is_no_slip_in_programs_that_are_right() -> None:
         ("for day in days:\n    if day == 1:\n        days.remove(day)", "the loop in line 1 goes through"),
         ("if a < 9:\n    b = 1\nelif a < 5:\n    b = 2", "line 3"),
         ("if a < 9:\n    return 1\nif a < 5 and b < 5:\n    return 2", "Move this condition above line 1"),
+        ("if a > 3 or b > 3:\n    return 1\nif b > 3:\n    return 2", "Remove what line 3 asks from line 1"),
         ("if a > 3:\n    return 1\nif a > 4:\n    return 2", "line 1 has already found that a > 3"),
+        ("tank_drive.on_for_rotations(40, 40, 1,5)", "write 1.5"),
+        ("tank_turn.on_for_degrees(-100, SpeedPercent(15), 90,5)", "write 90.5"),
+        ('say("Colour", colorLeft.color)', 'Write say("Colour" + " " + str(colorLeft.color))'),
+        ('if sender == "1":', "Write 1 without quotes"),
+        ('if glue.robot_number() == "2":', "Write 2 without quotes"),
+        ("if glue.robot_number() == 0:", "numbers 1 and 2"),
+        ('count = 1\nwhile count != "5":\n    count = count + 1', "Write 5 without quotes"),
+        ("if sender == 3:", "numbers 1 and 2"),
     ],
 )
 def test_a_slip_is_found_with_its_fix(line: str, words: str) -> None:
@@ -96,7 +112,22 @@ def test_a_slip_is_found_with_its_fix(line: str, words: str) -> None:
         "if a < 9:\n    return 1\nif b:\n    a = 1\nif a < 5:\n    return 2",
         "if a < 9 and b < 3:\n    return 1\nif a < 5:\n    return 2",
         "if a == 1:\n    return 1\nif a == 2:\n    return 2",
+        "if a > 3 or b > 3:\n    return 1\nif b > 2:\n    return 2",
+        "if a > 3 or b > 3:\n    x = 1\nif b > 3:\n    return 2",
         "if sensor.value() < 9:\n    return 1\nif sensor.value() < 5:\n    return 2",
+        "tank_drive.on_for_rotations(40, 40, 5)",
+        "tank_drive.on_for_rotations(40, 40, 5, True)",
+        "tank_drive.on_for_rotations(left_speed=40, right_speed=40, rotations=1, brake=False)",
+        'say("Colour", True)',
+        'say("Colour", wait=True)',
+        'say("Colour", 1)',
+        'def say(a, b):\n    print(a, b)\nsay("Colour", name)',
+        "if sender == 1:",
+        "if glue.robot_number() == 2:",
+        'answer = "1"\nif answer == "1":',
+        'count = 1\ncount = str(count)\nif count == "1":',
+        'for count in texts:\n    if count == "1":',
+        'sender = "1"\nif sender == "1":',
     ],
 )
 def test_no_slip_is_seen_in_what_is_right(line: str) -> None:
@@ -138,3 +169,117 @@ def test_a_turned_operator_is_found(text: str) -> None:
 )
 def test_a_negative_number_is_no_turned_operator(text: str) -> None:
     assert effects(text) == []
+
+
+def clues_of(text: str, *lost: Criterion) -> Clues:
+    """Return clues of a robot program that lost marks on these criteria, without trials."""
+    return Clues((listing(text),), (), lost, (), None, "preloaded", False)
+
+
+NESTED = "{start}for number in (1, 2):\n    {reset}while answer is None:\n        answer = find(number)\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            NESTED.format(start="answer = None\n", reset=""),
+            "Move answer = None from line 1 into the loop, below line 2",
+        ),
+        (
+            "side = 0\nfor square in range(3):\n    while side < 4:\n        side = side + 1\n",
+            "Move side = 0 from line 1",
+        ),
+        ("side = 0\nwhile True:\n    while side < 4:\n        side += 1\n", "Move side = 0 from line 1"),
+    ],
+)
+def test_a_value_that_an_inner_loop_keeps_is_found(text: str, words: str) -> None:
+    assert [words in found for found in hint_about_kept_value(clues_of(text, LOST))] == [True]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        NESTED.format(start="answer = None\n", reset="answer = None\n    "),
+        NESTED.format(start="", reset="answer = None\n    "),
+        "count = 0\nwhile count < 4:\n    while count < 2:\n        count += 1\n    count += 1\n",
+        "light = 100\nwhile True:\n    while light > 40:\n        light = colorLeft.reflected_light_intensity_pc\n",
+        "count = 0\nwhile count < 4:\n    count = count + 1\n",
+    ],
+)
+def test_no_kept_value_is_seen_in_loops_that_are_right(text: str) -> None:
+    assert list(hint_about_kept_value(clues_of(text, LOST))) == []
+
+
+LEFT, RIGHT = (f"{side.lower()} = color{side}.reflected_light_intensity_pc\n" for side in ("Left", "Right"))
+DRIVE = "    tank_drive.on(left, right)\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (f"{LEFT}{RIGHT}while left > 5:\n{DRIVE}    {LEFT}", 1),
+        (f"{LEFT}{RIGHT}while left > 5:\n{DRIVE}    {LEFT}    {RIGHT}", 0),
+        (f"{LEFT}{RIGHT}while left > 5:\n    tank_drive.on(left, 20)\n    {LEFT}", 0),
+        ("start = gyro.angle\nwhile now - start < 90:\n    now = gyro.angle\n", 0),
+        ("start = colorLeft.red\nx = 1\ny = 2\nnow = 3\nwhile now > start:\n    now = colorRight.red\n", 0),
+    ],
+)
+def test_a_reading_is_stale_only_if_its_twin_is_renewed(text: str, count: int) -> None:
+    assert len(list(hint_about_stale_twin(clues_of(text, LOST)))) == count
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("for n in range(3):\n    way = n * 2\n    tank_drive.on_for_rotations(40, 40, way)\n", 1),
+        ("for n in range(3):\n    tank_drive.on_for_rotations(40, 40, 2 * n)\n", 1),
+        ("for n in range(1, 4):\n    tank_drive.on_for_rotations(40, 40, 2 * n)\n", 0),
+        ("for n in range(3):\n    tank_drive.on_for_rotations(40, 40, n + 1)\n", 0),
+        ("for n in range(3):\n    tank_drive.on_for_rotations(40, 40, 2 * (n + 1))\n", 0),
+        ("for n in range(4):\n    tank_drive.on_for_rotations(40, 40, 2)\n", 0),
+    ],
+)
+def test_a_first_pass_with_0_is_found_only_in_a_product(text: str, count: int) -> None:
+    assert len(list(hint_about_zero_pass(clues_of(text, LOST)))) == count
+
+
+@pytest.mark.parametrize(
+    ("condition", "words"),
+    [
+        ("not red > 200 and green < 50", "not (red > 200 and green < 50)"),
+        ("not (red > 200 and green < 50)", ""),
+        ("not found and tries < 20", ""),
+        ("red > 200 and not green > 50", ""),
+    ],
+)
+def test_not_before_the_first_of_two_comparisons_is_found(condition: str, words: str) -> None:
+    statement = listing(f"while {condition}:\n    pass").code.statements[0]
+    found = describe_unbracketed_not(statement.condition)
+    assert words in found
+    assert bool(found) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "words"),
+    [
+        (100, 36000.0, "divide by 360"),
+        (360, 1.0, "multiply by 360"),
+        (3.14159, 1.0, "math.pi"),
+        (1.5708, 90.0, "180 / math.pi"),
+        (97, 80, ""),
+        ("left", "Left", 'write "left"'),
+        ("Py saw: 0", "Py saw: PY::0", 'removeprefix("PY::")'),
+        ("a b", "ab", "Only blanks differ"),
+        ("saw: 0", "saw 0", 'Only signs differ: write "saw: 0"'),
+        ("last: hello", "last: {'message': 'hello'}", 'take its value with ["message"]'),
+        ("last: hello", "last: {'message': 'bye'}", ""),
+        ("saw 0", "saw ['PY', '0']", "take one entry, [1]"),
+        ("saw 3", "saw ['PY', '0']", ""),
+        ("left", "right", ""),
+    ],
+)
+def test_a_difference_of_two_values_is_described(expected: object, actual: object, words: str) -> None:
+    found = advise_on_difference(expected, actual)
+    assert words in found
+    assert bool(found) == bool(words)

@@ -1,0 +1,71 @@
+"""Hints on what is accepted although it differs from the description: other words, or missing keys.
+
+They apply with full marks as well.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from responders.message_format import JSON
+from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues
+from service.grading.hint_formats import RETURN_LINE, describe_return_line
+from service.grading.hint_texts import ExpectedText, describe_quoting_line, is_near
+from service.grading.judging.message_parts import quote_text
+from submissions.submission import Part
+
+_QUOTED = re.compile(r'"([^"]{6,60})"')
+_KEY = re.compile(r'"(\w+)"\s*:')
+_VARIABLE_TEXT = re.compile(r"\d|[{}<>:]")
+
+
+def hint_about_other_words(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a text that has other words than the description quotes."""
+    texts: Sequence[tuple[Part, str, Sequence[str]]] = (
+        ("program", "says", clues.spoken),
+        ("program", "prints", clues.printed),
+        ("responder", "answers", clues.answers),
+    )
+    for quotation in _QUOTED.findall(_join_task_lines(clues)):
+        opening = quotation.partition("...")[0].strip()
+        if len(opening.split()) < 2 or _VARIABLE_TEXT.search(opening):
+            continue
+        expected = ExpectedText(opening, "contains")
+        if any(expected.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
+            continue
+        for part, verb, part_texts in texts:
+            similar_text = next((text for text in part_texts if is_near(expected, text)), None)
+            if similar_text is not None:
+                location = describe_quoting_line(clues, part, similar_text)
+                yield f"{location} {verb} {quote_text(similar_text)}; the assignment asks for {quote_text(opening)}"
+                return
+
+
+def hint_about_missing_keys(clues: Clues) -> Iterator[str]:
+    """Yield a hint on an answer without keys that the description shows."""
+    required_keys = list(
+        dict.fromkeys(key for form in _extract_json_objects(_join_task_lines(clues)) for key in _KEY.findall(form))
+    )
+    answers = [text for text in clues.answers if text.startswith(JSON) and len(text) < MAX_TEXT_LENGTH]
+    answer_keys = {key for text in answers for key in _KEY.findall(text)}
+    missing_keys = [key for key in required_keys if key not in answer_keys]
+    if missing_keys and answer_keys:
+        location = describe_return_line(answers[0], clues, RETURN_LINE)
+        keys = " and ".join(map(quote_text, missing_keys[:3]))
+        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
+
+
+def _join_task_lines(clues: Clues) -> str:
+    return " ".join(clues.task.split())
+
+
+def _extract_json_objects(task: str) -> Iterator[str]:
+    """Yield each object after ``JSON::``, up to its closing bracket."""
+    for piece in task.split(JSON)[1:]:
+        depth = 0
+        for index, letter in enumerate(piece):
+            depth += (letter == "{") - (letter == "}")
+            if depth == 0:
+                yield piece[: index + 1]
+                break

@@ -1,0 +1,72 @@
+"""Hints on sensor loops that end at once, because their condition is false from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_code import Statement, is_name, join_tokens
+from service.grading.hint_structure import collect_statements, has_motor_call
+from service.grading.hint_tables import CONTINUOUS_MOVES, PROPERTIES, READINGS
+
+_IMMEDIATE_SECONDS = 0.5
+
+
+def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
+    if clues.seconds <= _IMMEDIATE_SECONDS and not any(True for _ in clues.faults):
+        yield from (sentence + fix for sentence, fix in describe_skipped_loops(clues))
+
+
+def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
+    """Yield the first sensor loop after the motors are switched on: why it ends immediately, and the fix."""
+    for listing, statement in collect_statements(clues):
+        reading = next((token for token in statement.condition if token in PROPERTIES), "")
+        is_driving = any(
+            has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
+        )
+        if statement.keyword == "while" and reading and is_driving:
+            condition = join_tokens(statement.condition)
+            reason = f"{listing.locate(statement.line)}: the loop ends at once, because {condition} is false"
+            yield _explain_skipped_loop(listing, statement, reading, reason)
+            return
+
+
+def _explain_skipped_loop(listing: Listing, loop: Statement, reading: str, reason: str) -> tuple[str, str]:
+    """Return why a loop ends immediately, and the fix that its condition suggests."""
+    condition = join_tokens(loop.condition)
+    unbracketed_fix = describe_unbracketed_not(loop.condition)
+    if unbracketed_fix:
+        return f"{reason} from the start. {unbracketed_fix}", ""
+    flag = loop.condition[1] if loop.condition[0] == "not" and len(loop.condition) == 2 else ""
+    decision = next((each for each in listing.code.list_body(loop) if flag and each.target == flag), None)
+    if decision is not None:
+        explanation = f"{reason} in its second pass. Line {decision.line} makes {flag} true at the first reading"
+        return f"{explanation}. Print the values in {join_tokens(decision.tokens[2:])}, and check the condition", (
+            ": white has much red, green and blue. Compare red with green" if _reads_red_alone(decision) else ""
+        )
+    unit = f" {reading} {READINGS[reading][2]}." if reading in READINGS else ""
+    is_single_comparison = not any(token in ("and", "or", "not") for token in loop.condition)
+    opposite = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
+    has_opposite = is_single_comparison and opposite != condition
+    fix = f", or write {opposite}" if has_opposite else ", and each part of the condition"
+    return f"{reason} from the start.{unit} Check the number", fix
+
+
+def describe_unbracketed_not(condition: Sequence[str]) -> str:
+    """Return the fix of ``not red > 200 and green < 50``, where ``not`` counts for the first part only."""
+    if len(condition) < 2 or condition[0] != "not" or condition[1] == "(":
+        return ""
+    end = next((place for place, token in enumerate(condition) if token in ("and", "or")), None)
+    if end is None or not any(token in ("<", ">", "<=", ">=", "==", "!=") for token in condition[:end]):
+        return ""
+    return (
+        f"not counts only for {join_tokens(condition[1:end])}. If it is meant for both parts, write not "
+        f"({join_tokens(condition[1:])})"
+    )
+
+
+def _reads_red_alone(statement: Statement) -> bool:
+    """Return whether a condition compares only the red part of a colour with a number."""
+    names = {token for token in statement.tokens[2:] if is_name(token)}
+    return bool(names) and names <= {"r", "red", "colorLeft", "colorRight"}

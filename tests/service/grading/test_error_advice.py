@@ -1,0 +1,182 @@
+"""Advice on errors: from the text of the program and Python's own message."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_errors import advise_on_error
+from sim.recording import Fault, Verdict
+
+pytestmark = pytest.mark.fast
+
+
+def advice(text: str, message: str, line: int) -> str:
+    """Return the advice on an error in a robot program."""
+    listing = Listing("robot.py", "program", tuple(text.split("\n")))
+    clues = Clues((listing,), (), (), (), None, "preloaded", False)
+    return advise_on_error(Fault(0.0, Verdict.PROGRAM_ERROR, "program", message, line), clues)
+
+
+def syntax_advice(text: str) -> str:
+    """Return the advice on a program that Python cannot parse, with Python's own message."""
+    with pytest.raises(SyntaxError) as caught:
+        compile(text, "robot.py", "exec")
+    error = caught.value
+    return advice(text, f"{type(error).__name__}: {error.msg}", error.lineno or 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('say "hello"', 'write say("hello")'),
+        ("say count", "write say(count)"),
+        ("tank_drive.on 50, 50", "write tank_drive.on(50, 50)"),
+        ('print "PY::" + str(count)', 'write print("PY::" + str(count))'),
+        ("while count => 0:\n    pass", "Write >="),
+        ("while count =< 0:\n    pass", "Write <="),
+        ("while count <> 0:\n    pass", "Write !="),
+        ("while count > = 0:\n    pass", "Write >="),
+        ("if count = = 3:\n    pass", "Write =="),
+        ("tank_drive.on(50%, 50%)", "write 50 in place of 50%"),
+        ("time.sleep(2s)", "write 2 in place of 2s"),
+        ("distance = 30 cm", "write 30 in place of 30 cm"),
+        ("print(PY::hello)", 'write print("PY::hello")'),
+        ("print(IMG_DATA::)", 'write print("IMG_DATA::")'),
+        ('print("Light: " light)', "write + between them"),
+        ('say(name " is here")', "write + between them"),
+        ("count = 10 while count > 0:\n    pass", "begins at while"),
+        ('say("a") print("b")', "begins at print"),
+        ("if a:\n    b = 1\nelif:\n    b = 2", "write else:"),
+        ("while:\n    b = 2", "needs a condition"),
+        ("if a:\n    b = 1\nelse a > 3:\n    b = 2", "or elif a > 3:"),
+        ("```\nsay(1)\n```", "Delete each line that begins with ```"),
+        ("1 say(1)", "Delete the numbers"),
+        ("12: say(1)", "Delete the numbers"),
+        ("speed = \u221250", "minus sign of the keyboard"),
+        ("speed = \u201350", "minus sign of the keyboard"),
+        ("speed\u00a0= 50", "A blank was copied"),
+    ],
+)
+def test_a_line_that_python_cannot_parse_has_its_fix(text: str, words: str) -> None:
+    assert words in syntax_advice(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "never"),
+    [
+        ('say("=>")\nif a b:\n    pass', "no sign"),
+        ('print("50%)', "no unit"),
+        ('print("PY::" + a b)', "needs quotes"),
+        ("return if", "brackets"),
+        ('x = ["a" "b" c', "line number"),
+        ("10 + + * 3", "line number"),
+        ("say if", "brackets"),
+        ("x = [a for b in c", "begins at"),
+        ("x = y + z w", "begins at"),
+    ],
+)
+def test_a_fix_is_not_for_another_mistake(text: str, never: str) -> None:
+    assert never not in syntax_advice(text)
+
+
+_STR_INT = "TypeError: '<' not supported between instances of 'str' and 'int'"
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "words"),
+    [
+        ('count = "1"\nwhile count < 10:', _STR_INT, "Write count = 1"),
+        ("speed = '40'\nspeed = speed + 10", 'TypeError: can only concatenate str (not "int") to str', "speed = 40"),
+        ('a = "one"\nwhile a < 10:', _STR_INT, "int()"),
+        (
+            "speed = 1,5\nx = speed * 2 + 3",
+            'TypeError: can only concatenate tuple (not "int") to tuple',
+            "In line 1, 1,5 is two numbers",
+        ),
+        (
+            "import time\ntime.sleep(0,5)",
+            "TypeError: time.sleep() takes exactly one argument (2 given)",
+            "write 0.5",
+        ),
+        (
+            "gyro = GyroSensor(INPUT_4)\nif gyro > 90:",
+            "TypeError: '>' not supported between instances of 'GyroSensor' and 'int'",
+            "gyro.angle",
+        ),
+        (
+            "import time\nwhile tank_drive.left_motor < 1000:",
+            "TypeError: '<' not supported between instances of 'LargeMotor' and 'int'",
+            "tank_drive.left_motor.position",
+        ),
+        (
+            "a = 1\nx = ultrasonic / 10",
+            "TypeError: unsupported operand type(s) for /: 'UltrasonicSensor' and 'int'",
+            "ultrasonic.distance_centimeters",
+        ),
+        ("x = 1\nprint['a']", "TypeError: 'builtin_function_or_method' object is not subscriptable", "print(...)"),
+        ("x = 1\nx = int['5']", "TypeError: type 'int' is not subscriptable", "int(...)"),
+        (
+            "try:\n    x = int(y)\nexcept KeyError:\n    x = 0",
+            "ValueError: could not convert string to float: 'a'",
+            "(KeyError, ValueError)",
+        ),
+        (
+            "try:\n    x = a[b]\nexcept (KeyError, ValueError):\n    x = 0",
+            "TypeError: unhashable",
+            "(KeyError, ValueError, TypeError)",
+        ),
+        (
+            "import ev3dev2_glue\nglue.pyState()",
+            "NameError: name 'glue' is not defined",
+            "Write import ev3dev2_glue as glue there",
+        ),
+        ("x = 1\nglue.pyState()", "NameError: name 'glue' is not defined", "Add import ev3dev2_glue as glue"),
+        ("x = 1\nx.split(',')", "AttributeError: 'dict' object has no attribute 'split'", 'such as image["left"]'),
+        ("x = 1\nx.split(',')", "AttributeError: 'list' object has no attribute 'split'", "take one entry"),
+        ("x = 1\nx.strip()", "AttributeError: 'int' object has no attribute 'strip'", "str(...)"),
+        (
+            "x = 1\nsay(1, Wait=True)",
+            "TypeError: say() got an unexpected keyword argument 'Wait'",
+            "Did you mean wait=?",
+        ),
+        (
+            "def go(speed): pass\ngo(sped=1)",
+            "TypeError: go() got an unexpected keyword argument 'sped'",
+            "Did you mean speed=?",
+        ),
+        (
+            "x = 1\nsay(1, loud=True)",
+            "TypeError: say() got an unexpected keyword argument 'loud'",
+            "leave loud=... out",
+        ),
+        (
+            'NAMES = ["a", "b"]\nname = NAMES[network.predict(x)[0]]',
+            "IndexError: list index out of range",
+            "NAMES has 2 names",
+        ),
+        (
+            "factor = [1, 2, 1]\nway = factor * 2.5",
+            "TypeError: can't multiply sequence by non-int of type 'float'",
+            "Line 1 makes factor a whole list",
+        ),
+        (
+            "def responder(message):\n    return text[4:]",
+            "NameError: name 'text' is not defined",
+            "write message in place of text",
+        ),
+        (
+            "x = 1\nfit(images, labels)",
+            "ValueError: inconsistent numbers of samples: [140, 10]",
+            "each image became 14 rows",
+        ),
+        (
+            "grey = pixels.mean(axis=0)\nnetwork.predict(grey)",
+            "ValueError: X has 42 features, but MLPClassifier is expecting 196 features as input",
+            "write axis=2",
+        ),
+        ("x = 1\nx = right", "NameError: name 'right' is not defined", "put it in quotes"),
+    ],
+)
+def test_a_value_of_the_wrong_type_has_its_fix(text: str, message: str, words: str) -> None:
+    assert words in advice(text, message, 2)
