@@ -321,7 +321,7 @@ class _Execution:
 
 
 def _add_order_hint(run: NotebookRun, missing_message: str, cell_number: int) -> NotebookRun:
-    """Return the run with a hint to the cell that defines the responder, in place of ``missing_message``."""
+    """Return the run with a hint to the cell that defines the responder, instead of ``missing_message``."""
     message = f"the responder is defined in cell {cell_number}, after the robot of cell {run.cell} has run"
     hint = f"Move cell {cell_number} above cell {run.cell}."
     faults = tuple(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from responders import wire
 from responders.faults import build_error_fault, to_child_data_error
-from responders.libraries_needed import build_notebook_source
+from responders.required_libraries import build_notebook_source
 from responders.responder_process import ResponderProcess
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter

@@ -88,7 +88,7 @@ def _sort_faults(faults: Iterable[Fault | None]) -> tuple[Fault, ...]:
 
 
 def _attribute_to_second(fault: Fault, partner: PartnerSpec) -> Fault | None:
-    """Return the fault as one of the second program. None for a time limit of a given program, which is no fault."""
+    """Return the fault as one of the second program. None for a time limit of a given program, which is not a fault."""
     if fault.who != "program":
         return fault
     if partner.given and fault.verdict is Verdict.TIME_LIMIT:

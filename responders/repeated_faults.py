@@ -300,7 +300,7 @@ def _remove_seed(frame: wire.Frame) -> wire.Frame:
 
 
 def _is_independent(frame: wire.Frame) -> bool:
-    """Return whether the child gets data only from the worker: it is no notebook and has no agents."""
+    """Return whether the child gets data only from the worker: it is not a notebook and has no agents."""
     return not frame.keys() & {"cells", "agents", "agent"}
 
 

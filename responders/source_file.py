@@ -1,6 +1,6 @@
 """A Python source file as a value: its name and its text.
 
-Nothing here executes it.
+This module never executes it.
 """
 
 from __future__ import annotations

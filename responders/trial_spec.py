@@ -1,6 +1,6 @@
 """Trial specifications as plain values: parts of a submission, robot, floor, channel and seeds.
 
-Nothing here executes code. ``trial.py`` turns a specification into a recording.
+This module executes no code. ``trial.py`` turns a specification into a recording.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from responders.channel import Channel
-from responders.libraries_needed import may_need_libraries
+from responders.required_libraries import may_need_libraries
 from responders.sandbox.inside.libraries import LIBRARIES
 from responders.sandbox.roles import ChildRole
 from responders.sandbox.running_child import ChildLimits

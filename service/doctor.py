@@ -1,6 +1,6 @@
 """Checks of this machine and of the whole service that find problems which prevent grading.
 
-``robomark doctor`` prints the findings for this machine, ``/health/ready`` those for the service. Nothing here raises.
+``robomark doctor`` prints the findings for this machine, ``/health/ready`` those for the service. Checks never raise.
 The only change is that the home folder is created.
 """
 

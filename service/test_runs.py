@@ -1,6 +1,6 @@
 """Test runs: a program runs once, unmarked, in the first visible scenario with a public seed.
 
-Uses the sandbox and simulator of grading; ``store.tryouts`` stores owners and results.
+Uses the sandbox and simulator of grading; ``store.queue.test_runs`` stores owners and results.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def _build_result(run: Grade, submission: Submission) -> dict[str, Any]:
     return {
         "tone": outcome.tone,
         "happened": outcome.happened,
-        "whose": outcome.whose,
+        "whose": outcome.explanation,
         "seconds": run.trials[0].recording.end_t if run.trials else 0.0,
         "lines": [[round(t, 2), to_display_text(text, _MAX_LINE_LENGTH)] for t, text in lines[:_MAX_LINES]],
         "more_lines": max(0, len(lines) - _MAX_LINES),

@@ -1,4 +1,4 @@
-"""Base class of all tables that instructors write: unknown keys and texts in place of numbers are errors.
+"""Base class of all tables that instructors write: unknown keys and texts instead of numbers are errors.
 
 Subclasses define the tables.
 """

@@ -1,4 +1,4 @@
-"""Reference responders as text: submissions that work, and files that an assignment gives by their names.
+"""Reference responders as text: correct submissions, and files that assignments refer to by name.
 
 Each file of this folder is one, written as students write them, and run inside the sandbox; nothing here imports one.
 """
@@ -8,12 +8,12 @@ from importlib.resources.abc import Traversable
 
 
 def names() -> tuple[str, ...]:
-    """The names of the files, sorted."""
+    """Return the sorted names of the files."""
     return tuple(sorted(_files()))
 
 
 def source(name: str) -> str:
-    """The text of a reference responder. Raises KeyError for a name that is not in ``names()``."""
+    """Return the text of a reference responder. Raises KeyError for a name that is not in ``names()``."""
     return _files()[name].read_text(encoding="utf-8")
 
 

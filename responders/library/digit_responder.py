@@ -1,4 +1,4 @@
-"""Names the digit under the left light sensor with a trained network, mlp_digits_14x14.joblib, and how sure it is."""
+"""Recognises the digit below the left light sensor with the network mlp_digits_14x14.joblib, with its confidence."""
 
 import ast
 import json
@@ -18,7 +18,7 @@ PLAIN = 25  # greys that differ less than this (standard deviation) are paper; h
 
 
 def image_parser(msg):
-    """The kind of message and what is in it, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
+    """Return the kind and the content of a message, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
     match = re.search(r"^(IMG_DATA|PY)::(.+)", msg)
     if match is None:
         return None
@@ -30,7 +30,7 @@ def image_parser(msg):
 
 
 def digit_recognising_agent(msg):
-    """What the network says of an image, and how sure it is from 0 to 1; a text is only repeated."""
+    """Return the network's digit for an image, with its confidence from 0 to 1. Repeat a text."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(
@@ -52,7 +52,7 @@ def logger(msg, response):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     response = "JSON::" + json.dumps({"message": agent(parser(msg_object))})
     logger(msg_object, response)
     return response

@@ -1,4 +1,4 @@
-"""Answers every ``PY::`` text with what was in it, and keeps a log of both."""
+"""Answers every ``PY::`` text with its content, and logs both."""
 
 import ast
 import re
@@ -8,7 +8,7 @@ from nbev3devsim.load_nbev3devwidget import roboSim
 
 
 def simple_parser(msg):
-    """The Python value after ``PY::``, or the text itself where it is none; None for any other message."""
+    """Return the Python value after ``PY::``, or the text if it is no Python value; None for other messages."""
     match = re.search(r"^PY::(.+)", msg)
     if match is None:
         return None

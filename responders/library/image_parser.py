@@ -1,4 +1,4 @@
-"""The JSON responder with a parser that also takes ``IMG_DATA::`` messages and says which kind each was."""
+"""The JSON responder with a parser that also accepts ``IMG_DATA::`` messages and returns the kind of each message."""
 
 import ast
 import json
@@ -9,7 +9,7 @@ from nbev3devsim.load_nbev3devwidget import roboSim
 
 
 def image_parser(msg):
-    """The kind of message and what is in it, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
+    """Return the kind and the content of a message, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
     match = re.search(r"^(IMG_DATA|PY)::(.+)", msg)
     if match is None:
         return None
@@ -21,7 +21,7 @@ def image_parser(msg):
 
 
 def simple_echo_agent(msg):
-    """Echo whatever the parser made of the message."""
+    """Repeat the parsed message."""
     return f"Py saw: {msg}"
 
 
@@ -32,7 +32,7 @@ def logger(msg, response):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     response = "JSON::" + json.dumps({"message": agent(parser(msg_object))})
     logger(msg_object, response)
     return response

@@ -9,7 +9,7 @@ from nbev3devsim.load_nbev3devwidget import roboSim
 
 
 def simple_parser(msg):
-    """The Python value after ``PY::``, or the text itself where it is none; None for any other message."""
+    """Return the Python value after ``PY::``, or the text if it is no Python value; None for other messages."""
     match = re.search(r"^PY::(.+)", msg)
     if match is None:
         return None
@@ -21,7 +21,7 @@ def simple_parser(msg):
 
 
 def simple_echo_agent(msg):
-    """Echo whatever the parser made of the message."""
+    """Repeat the parsed message."""
     return f"Py saw: {msg}"
 
 
@@ -32,7 +32,7 @@ def logger(msg, response):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     response = "JSON::" + json.dumps({"message": agent(parser(msg_object))})
     logger(msg_object, response)
     return response

@@ -1,4 +1,4 @@
-"""Names the digit under the left light sensor as the course first does: cut to black and white, and without doubt."""
+"""Recognises the digit below the left light sensor in black and white, as in the course's first version."""
 
 import ast
 import json
@@ -15,7 +15,7 @@ MLP = load("mlp_digits_14x14.joblib")
 
 
 def image_parser(msg):
-    """The kind of message and what is in it, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
+    """Return the kind and the content of a message, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
     match = re.search(r"^(IMG_DATA|PY)::(.+)", msg)
     if match is None:
         return None
@@ -27,7 +27,7 @@ def image_parser(msg):
 
 
 def digit_recognising_agent(msg):
-    """What the network says of an image cut to black and white at a grey of 127."""
+    """Return the network's digit for an image in black and white, with a threshold of 127."""
     image_data = pd.DataFrame(
         [{"side": side, "vals": roboSim.process_raw_image_data(msg["obj"][side])} for side in ("left", "right")]
     )
@@ -37,7 +37,7 @@ def digit_recognising_agent(msg):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     return "JSON::" + json.dumps({"message": agent(parser(msg_object))})
 
 

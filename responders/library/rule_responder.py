@@ -1,4 +1,4 @@
-"""Names the shape under the left light sensor by rules alone: the box round it and where its black lies."""
+"""Recognises the shape below the left light sensor by rules: its bounding box and the position of its black pixels."""
 
 import ast
 import json
@@ -16,7 +16,7 @@ DARK = 127  # a grey from here down is black, whatever noise up to 127 does to b
 
 
 def image_parser(msg):
-    """The kind of message and what is in it, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
+    """Return the kind and the content of a message, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
     match = re.search(r"^(IMG_DATA|PY)::(.+)", msg)
     if match is None:
         return None
@@ -28,7 +28,7 @@ def image_parser(msg):
 
 
 def shape_in(image):
-    """The shape in a greyscale image, or None where there is none."""
+    """Return the shape in a greyscale image, or None if there is none."""
     black = np.asarray(image) < DARK
     if black.sum() < FEWEST_BLACK:
         return None
@@ -47,13 +47,13 @@ def shape_in(image):
 
 
 def weight_below(box):
-    """Black pixels in the lower half less those in the upper; a middle row counts for neither."""
+    """Return the black pixels in the lower half minus those in the upper half, without a middle row."""
     half = len(box) // 2
     return int(box[-half:].sum()) - int(box[:half].sum())
 
 
 def rule_agent(msg):
-    """What the rules say of an image; a text is only repeated."""
+    """Return the shape in an image according to the rules. Repeat a text."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(
@@ -73,7 +73,7 @@ def logger(msg, response):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     response = "JSON::" + json.dumps({"message": agent(parser(msg_object))})
     logger(msg_object, response)
     return response

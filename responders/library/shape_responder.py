@@ -1,4 +1,4 @@
-"""Names the shape under the left light sensor with a trained network, mlp_shapes_14x14.joblib, from its own folder."""
+"""Recognises the shape below the left light sensor with the network mlp_shapes_14x14.joblib from its own folder."""
 
 import ast
 import json
@@ -26,7 +26,7 @@ codemap = {code: shape for shape, code in shapemap.items()}
 
 
 def image_parser(msg):
-    """The kind of message and what is in it, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
+    """Return the kind and the content of a message, as ``{'typ': ..., 'obj': ...}``; None for any other message."""
     match = re.search(r"^(IMG_DATA|PY)::(.+)", msg)
     if match is None:
         return None
@@ -38,7 +38,7 @@ def image_parser(msg):
 
 
 def shape_recognising_agent(msg):
-    """What the network says of an image; a text is only repeated."""
+    """Return the network's shape for an image. Repeat a text."""
     if msg is None or msg["typ"] != "IMG_DATA":
         return {"report": f"Agent says: I heard {msg and msg['obj']}"}
     image_data = pd.DataFrame(
@@ -56,7 +56,7 @@ def logger(msg, response):
 
 
 def json_responder(msg_object):
-    """Hand the parsed message to the agent and wrap its answer as ``JSON::``."""
+    """Pass the parsed message to the agent and return its answer after ``JSON::``."""
     response = "JSON::" + json.dumps({"message": agent(parser(msg_object))})
     logger(msg_object, response)
     return response

@@ -49,7 +49,7 @@ def policy(
     ] = False,
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
-    """Set the policy, which replaces the earlier one; without options, show it."""
+    """Set the deadline and attempts, replacing the earlier policy. Without options, show the policy."""
     limits = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
     if drop and limits != PolicyLimits():
         raise UsageError("--drop removes all limits, expected no other limits with it")
@@ -104,7 +104,7 @@ def prepare(
     assignment: Annotated[str, typer.Argument(help="An assignment's id in the catalogue, or a folder.")],
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
-    """Add an assignment to a course without opening it; run it again to use the current version."""
+    """Add an assignment to a course without opening it. Repeat the command to use the current version."""
     # This import loads all kinds of criteria, which other commands do not need.
     from submissions.assignment.reader import find_assignment
 
@@ -115,7 +115,7 @@ def prepare(
 
 
 def open_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
-    """Let students see a prepared assignment and submit to it on the web."""
+    """Open a prepared assignment: students see it and can submit to it on the web."""
     with open_installation() as (service, actor):
         course_assignment = assignments.open_for_students(
             service, actor, courses.find(service, actor, course), assignment
@@ -124,7 +124,7 @@ def open_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COU
 
 
 def close_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
-    """Stop web submissions to an assignment; existing submissions stay."""
+    """Stop web submissions to an assignment. Existing submissions stay."""
     with open_installation() as (service, actor):
         course_assignment = assignments.close(service, actor, courses.find(service, actor, course), assignment)
     _print_state(course_assignment)
@@ -139,12 +139,12 @@ def remove_assignment(assignment: AssignmentId, course: CourseOption = DEFAULT_C
 
 
 def hide_names(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
-    """Hide the students' names of an assignment from all who mark it."""
+    """Hide the students' names from everyone who marks this assignment."""
     _set_names_hidden(assignment, course, hidden=True)
 
 
 def show_names(assignment: AssignmentId, course: CourseOption = DEFAULT_COURSE) -> None:
-    """Show the students' names of an assignment to all who mark it."""
+    """Show the students' names to everyone who marks this assignment."""
     _set_names_hidden(assignment, course, hidden=False)
 
 

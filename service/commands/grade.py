@@ -29,7 +29,7 @@ def grade(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write a report for each submission to this folder.")] = None,
     form: Annotated[
-        str, create_format_option("What to print; a wrong one names them all.", _list_document_formats)
+        str, create_format_option("Output format. An unknown format lists the available ones.", _list_document_formats)
     ] = "text",
     language: LanguageOption = SOURCE_LANGUAGE,
     run: Annotated[

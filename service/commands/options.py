@@ -139,7 +139,7 @@ class ChannelFlags:
         None
     )
     reordering: Annotated[
-        float | None, typer.Option("--reordering", help="Share of messages that others overtake.")
+        float | None, typer.Option("--reordering", help="Share of messages that arrive out of order.")
     ] = None
     corruption: Annotated[
         float | None, typer.Option("--corruption", help="Share of messages with changed letters and digits.")

@@ -30,7 +30,7 @@ class MagicFlags:
     background: Annotated[
         str | None, typer.Option("-b", "--background", help="Floor, or an image of 2362 x 1143 pixels.")
     ] = None
-    robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot.")] = None
+    robot_setup: Annotated[str | None, typer.Option("-r", "--robotSetup", help="Robot configuration.")] = None
     obstacles: Annotated[str | None, typer.Option("-o", "--obstacles", help="Obstacle preset.")] = None
     x: Annotated[str | None, typer.Option("-x", "--xpos", help="Start, mm from the left.")] = None
     y: Annotated[str | None, typer.Option("-y", "--ypos", help="Start, mm from the bottom.")] = None

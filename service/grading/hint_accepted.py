@@ -38,7 +38,7 @@ def hint_about_other_words(clues: Clues) -> Iterator[str]:
             similar_text = next((text for text in part_texts if is_near(expected, text)), None)
             if similar_text is not None:
                 location = describe_quoting_line(clues, part, similar_text)
-                yield f"{location} {verb} {quote_text(similar_text)}; the assignment asks for {quote_text(opening)}"
+                yield f"{location} {verb} {quote_text(similar_text)}; the assignment requires {quote_text(opening)}"
                 return
 
 
@@ -53,7 +53,7 @@ def hint_about_missing_keys(clues: Clues) -> Iterator[str]:
     if missing_keys and answer_keys:
         location = describe_return_line(answers[0], clues, RETURN_LINE)
         keys = " and ".join(map(quote_text, missing_keys[:3]))
-        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment asks for"
+        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment requires"
 
 
 def _join_task_lines(clues: Clues) -> str:

@@ -68,7 +68,7 @@ def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     line = _describe_key_line([similar_key], clues) if similar_key and key not in answer_keys else ""
     if line:
         yield (
-            f"{line} answers the key {quote_text(similar_key)}; the assignment asks for {quote_text(key)}. Write "
+            f"{line} answers the key {quote_text(similar_key)}; the assignment requires {quote_text(key)}. Write "
             f"{quote_text(key)}"
         )
 
@@ -157,7 +157,7 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
 
 
 def _compute_shift(missing: MissingEntry) -> tuple[str, int] | None:
-    """Return the key and expected minus actual value of an answer; None if they are no whole numbers."""
+    """Return the key and expected minus actual value of an answer; None if they are not whole numbers."""
     value = _unwrap_object(missing.texts[0]).get(missing.previous) if len(missing.texts) == 1 else None
     if not isinstance(value, int) or not missing.entry.isdigit():
         return None

@@ -162,7 +162,7 @@ def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
     if name.startswith("ev3dev2") and fault.who == "responder":
         return f"Only a robot program can import {name}: delete this line."
     if name in UNAVAILABLE_MODULES:
-        return f"{name} is not available here: delete this line and what uses it."
+        return f"{name} is not available here: delete this line and all lines that use it."
     similar_modules = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
     return f"Did you mean {similar_modules[0]}?" if similar_modules and not fault.hint else ""
 

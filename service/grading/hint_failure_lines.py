@@ -256,18 +256,18 @@ def _hint_about_loop_end(failure: _Failure) -> str:
     body = code.list_body(loop)
     if failure.find_finding(StillRunning) is not None:
         condition_advice = (
-            f" In the right place the sensor reads {required_reading}: it must be false there"
+            f" At the required place, the sensor reads {required_reading}, and the condition must be false"
             if required_reading
             else ""
         )
         return (
             f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop did not end, because {condition} "
-            f"stayed true.{condition_advice or ' Choose a condition that becomes false in the right place'}"
+            f"stayed true.{condition_advice or ' Choose a condition that becomes false at the required place'}"
         )
     end_clause = "" if any(each.keyword == "break" for each in body) else f" as soon as {condition} is false"
     reading_sentence = f" The sensor read {last_reading}" if last_reading else ""
     reading_sentence += (
-        f", and reads {required_reading} where it should stop."
+        f"; at the required place it reads {required_reading}."
         if last_reading and required_reading
         else "."
         if last_reading
@@ -275,7 +275,7 @@ def _hint_about_loop_end(failure: _Failure) -> str:
     )
     return (
         f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop ends{end_clause}.{reading_sentence} "
-        "Change the condition, so that it is true until the robot is in the right place"
+        "Change the condition so that it is true until the robot reaches this place"
     )
 
 

@@ -163,7 +163,7 @@ def _hint_about_redefinitions(process: list[Listing]) -> Iterator[str]:
                         else f"line {head.line} of {earlier_listing.name}"
                     )
                     yield (
-                        f"{listing.locate(statement.line)} defines {name} again, in place of the function in "
+                        f"{listing.locate(statement.line)} defines {name} again, instead of the function in "
                         f"{location}. Delete one of the two, or give it another name"
                     )
                     return

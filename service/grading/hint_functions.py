@@ -258,6 +258,6 @@ def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
     if stop is not None and wrong is not None and _is_shorter_list(wrong):
         return (
             f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only "
-            "this value, write continue in place of break"
+            "this value, write continue instead of break"
         )
     return ""

@@ -171,7 +171,7 @@ def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
                     amount = join_tokens(call.arguments[-1]) if call.arguments else "the number"
                     yield (
                         f"{listing.locate(drive_statement.line)}: {name} never uses its parameter {parameter}, so it "
-                        f"does the same with each value. Write {parameter} in place of {amount} if that is meant"
+                        f"does the same with each value. Write {parameter} instead of {amount} if that is meant"
                     )
                     return
 

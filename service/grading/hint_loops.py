@@ -217,7 +217,7 @@ def _find_wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statem
         direction = _find_step_sign(statement, name)
         if direction == _DIVERGING_SIGNS[sign]:
             verb, correct_sign = ("grow", "-") if direction == "+" else ("shrink", "+")
-            return statement, f"makes {name} {verb}", f"Write {correct_sign} in place of {direction}"
+            return statement, f"makes {name} {verb}", f"Write {correct_sign} instead of {direction}"
     return None
 
 
@@ -266,7 +266,7 @@ def _describe_missing_actions(body: Sequence[Statement], fault: Fault) -> str:
 
 def _suggest_loop_end(body: Sequence[Statement], fault: Fault) -> str:
     if fault.who == "responder":
-        return "End it with break, or write a condition in place of True"
+        return "End it with break, or write a condition instead of True"
     if fault.verdict is Verdict.CPU_LIMIT:
         return "Read a sensor in its condition, or add time.sleep(0.1) and end it with break"
     return "End it with break, write a condition that reads a sensor, or remove the loop"

@@ -81,7 +81,7 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
         listing, statement = moves[0]
         head = _list_enclosing_conditions(listing, statement)[0]
         yield (
-            f"{listing.locate(statement.line)} moves the robot, but the program never came to it: the robot never "
+            f"{listing.locate(statement.line)} moves the robot, but the program never reached it: the robot never "
             f"moved. Check the condition in line {head.line}: {join_tokens(head.condition)}"
         )
     elif moves or not any(listing.code.statements for listing in clues.programs):
@@ -259,7 +259,7 @@ def hint_about_curves(clues: Clues) -> Iterator[str]:
             spot = 100 if steering > 0 else -100
             yield (
                 f"{listing.locate(statement.line)} steers by {steering:g}, so the robot drives a curve. "
-                f"To turn on the spot, write {spot} in place of {steering:g}"
+                f"To turn on the spot, write {spot} instead of {steering:g}"
             )
             return
 

@@ -56,7 +56,7 @@ def advise_on_owner(fault: Fault, clues: Clues, *_: object) -> str:
 def advise_on_constant(fault: Fault, *_: object) -> str:
     """Return advice on ``null`` or ``true``, as written in JSON."""
     name = _find_undefined_name(fault)
-    return f"Write {_CONSTANTS[name]} in place of {name}." if name in _CONSTANTS else ""
+    return f"Write {_CONSTANTS[name]} instead of {name}." if name in _CONSTANTS else ""
 
 
 def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:

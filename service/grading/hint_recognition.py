@@ -75,7 +75,7 @@ def _hint_about_other_sensor(clues: Clues) -> str:
         if line is not None and not any(each.find_line(_LEFT) for each in clues.responders):
             return (
                 f"{listing.locate(line)} uses the right sensor's image, but the picture lies under the left sensor. "
-                f"Write left in place of right"
+                f"Write left instead of right"
             )
     return ""
 

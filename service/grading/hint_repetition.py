@@ -162,9 +162,9 @@ def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
             and listing.code.number(condition[condition.index("==") + 1 :]) is not None
         ):
             yield (
-                f"{listing.locate(statement.line)}: the loop goes on only while {join_tokens(condition)} is true, so "
+                f"{listing.locate(statement.line)}: the loop continues only while {join_tokens(condition)} is true, so "
                 f"it ends at the first other reading: the program ended after {clues.seconds:.1f} s. Write a condition "
-                "that is true until the last reading that is asked for"
+                "that is true until the last required reading"
             )
             return
 

@@ -100,7 +100,7 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
                 if is_function and ":" in statement.tokens:
                     count = _describe_parameters(statement)
                     yield (
-                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} asks for {count}, "
+                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} expects {count}, "
                         f"but it is called with one text. Write def {statement.tokens[1]}(text):"
                     )
                     return
@@ -154,8 +154,8 @@ def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
                 yield f"{listing.locate(line)}: return without a value answers nothing. Write the answer after return"
             else:
                 yield (
-                    f"{listing.locate(head.line)}: {head.tokens[1]} can come to its end without a return, and answers "
-                    "nothing then. Add a return with an answer as its last line"
+                    f"{listing.locate(head.line)}: {head.tokens[1]} can end without a return, and then answers "
+                    "nothing. Add a return with an answer as its last line"
                 )
             return
 
@@ -178,7 +178,7 @@ def hint_about_unreadable_answers(clues: Clues) -> Iterator[str]:
             ]
             str_returns = [each for each in returns if each.has_token("str")]
             return_statement = (str_returns or undumped_returns or returns)[-1]
-            fix = "Write json.dumps(...) in place of str(...)" if str_returns else fault.hint
+            fix = "Write json.dumps(...) instead of str(...)" if str_returns else fault.hint
             yield f"{listing.locate(return_statement.line)}: {fault.message.rstrip('.')}. {fix}"
             return
 

@@ -78,7 +78,7 @@ def _check_caret(listing: Listing, statement: Statement) -> str:
             and _NUMBER.match(following)
             and (is_name(previous) or previous == ")" or _NUMBER.match(previous))
         ):
-            return f"{listing.locate(statement.line)}: ^ is not a power in Python. Write ** in place of ^"
+            return f"{listing.locate(statement.line)}: ^ is not a power in Python. Write ** instead of ^"
     return ""
 
 
@@ -93,7 +93,7 @@ def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
         if len(comparisons) > 1:
             return (
                 f"{listing.locate(statement.line)}: {token} is calculated before {comparisons[0]}, so this does not "
-                f"ask for both comparisons. Write {keywords[token]} in place of {token}"
+                f"ask for both comparisons. Write {keywords[token]} instead of {token}"
             )
     return ""
 
@@ -212,7 +212,7 @@ def _check_reading_as_text(listing: Listing, statement: Statement) -> str:
         reading = find_reading(tokens[index - 1 : index], listing.code)
         if sign not in ("==", "!=") or not _TEXT.match(text) or reading not in READINGS:
             continue
-        fix = "Write color_name in place of color" if reading == "color" else f"Write {text[1:-1]} without quotes"
+        fix = "Write color_name instead of color" if reading == "color" else f"Write {text[1:-1]} without quotes"
         return f"{listing.locate(statement.line)}: {reading} is a number, and never equals the text {text}. {fix}"
     return ""
 
@@ -280,7 +280,7 @@ def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
         return ""
     return (
         f"{listing.locate(next_statement.line)}: this if is also checked when the if in line {statement.line} was "
-        "true, so both run. Write elif in place of if"
+        "true, so both run. Write elif instead of if"
     )
 
 

@@ -129,7 +129,7 @@ def _advise_on_else_if(line: str) -> str:
     if match is None:
         return ""
     keyword = " ".join(match[1].split())
-    return f"Python has no {keyword}. Write elif in place of {keyword}."
+    return f"Python has no {keyword}. Write elif instead of {keyword}."
 
 
 def _advise_on_branch(line: str) -> str:

@@ -18,7 +18,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             r'can only concatenate str \(not "(?:dict|list)".*\n.*JSON::',
             "Write json.dumps(...) around the object.",
         ),
-        (r"can only concatenate str|must be str, not", "Put str() around what is not a text, or use an f-string."),
+        (r"can only concatenate str|must be str, not", "Convert other values with str(), or use an f-string."),
         (
             r"unsupported operand type\(s\) for \+=?: .*'str'.*\n.*(?:\+\s*f?[\"']|[\"']\s*\+)",
             "+ joins texts only: write str(...) around the number.",
@@ -33,28 +33,28 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"unsupported operand type\(s\) .*'NoneType'|^(?:Type|Attribute)Error: 'NoneType' object",
-            "A value is None: a function that ends without return gives None.",
+            "A value is None: a function without return returns None.",
         ),
-        (r"^(?:IndentationError|TabError)", "Start the lines of one block with the same number of blanks; no tabs."),
+        (r"^(?:IndentationError|TabError)", "Indent all lines of a block by the same number of spaces, without tabs."),
         (r"^SyntaxError: invalid character '[\u2018-\u201f]", "Type straight quotes, as they are on the keyboard."),
         (r"^SyntaxError: invalid character '[\u2010-\u2015\u2212]", "Type the minus sign of the keyboard: -"),
         (r"^SyntaxError: invalid non-printable character", "A blank was copied with the text. Delete it, and type it."),
         (r"^SyntaxError.*\n\s*(>>>|\.\.\. )", "\\g<1> is Python's prompt: delete it at the start of each line."),
         (
             r"^SyntaxError.*\n\s*((?:In|Out) ?\[[ \d]*\]:)",
-            "\\g<1> is a label of the notebook and no Python: delete it.",
+            "\\g<1> is a label of the notebook, not Python: delete it.",
         ),
         (r"^SyntaxError: expected ':'", "Put a colon at the end of this line."),
         (r"^SyntaxError: invalid syntax\n.*\bSpeedPercent\([^)]*$", "A closing bracket is missing."),
         (
             r"(?s)^IndexError.*pyState",
-            "The queue was still empty: wait until an answer has come, for example with time.sleep(1).",
+            "The queue was still empty. Wait for an answer first, for example with time.sleep(1).",
         ),
-        (r"^IndexError: list index out of range", "The list is shorter than that: check its length with len()."),
+        (r"^IndexError: list index out of range", "The list has no entry at this index. Check its length with len()."),
         (r"^TypeError: dump\(\)", "Did you mean json.dumps?"),
         (
             r"^ValueError: invalid literal for int\(\) with base 10: '(PY|IMG_DATA)::",
-            'Take the beginning off first: text.removeprefix("\\g<1>::").',
+            'Remove the prefix first: text.removeprefix("\\g<1>::").',
         ),
         (
             r"^JSONDecodeError: Expecting value: line 1 column 1.*\n.*removeprefix\([\"'](PY|IMG_DATA|JSON):?[\"']\)",
@@ -66,9 +66,9 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"^JSONDecodeError: Expecting value: line 1 column 1.*\n.*loads\((?!.*removeprefix)",
-            'The text is not JSON: take PY:: or IMG_DATA:: off first, as in text.removeprefix("IMG_DATA::").',
+            'The text is not JSON. Remove PY:: or IMG_DATA:: first, as in text.removeprefix("IMG_DATA::").',
         ),
-        (r"^TypeError: the JSON object must be str.*not dict", "It is an object already: leave json.loads out."),
+        (r"^TypeError: the JSON object must be str.*not dict", "It is already an object: remove json.loads."),
         (
             r"^TypeError: Object of type u?int\d+ is not JSON serializable",
             "Convert the numpy number with int(...) before json.dumps.",
@@ -115,7 +115,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"^TypeError: string indices must be integers",
-            "It is a text and has no keys: send an object from the responder, as json.dumps makes it, only once.",
+            "It is a text and has no keys. Send an object from the responder, and call json.dumps only once.",
         ),
         (
             r"^TypeError: type '(\w+)' is not subscriptable",
@@ -168,7 +168,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"^EOFError", "Remove input(), and write the value into the program."),
         (
             r"^ValueError: Expected 2D array, got 1D array",
-            "predict takes a list of images, even for one: add .reshape(1, -1).",
+            "predict expects a list of images, even for one image: add .reshape(1, -1).",
         ),
         (
             r"^ValueError: Found array with dim 3",
@@ -176,11 +176,11 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"X has 400 features, but \w+ is expecting 196",
-            "The network is for 14 x 14 images: cut the middle out of the 20 x 20 image, with [3:17, 3:17].",
+            "The network expects 14 x 14 images: crop the 20 x 20 image with [3:17, 3:17].",
         ),
         (
             r"X has 196 features, but \w+ is expecting 400",
-            "The network is for 20 x 20 images: do not cut the image.",
+            "The network expects 20 x 20 images: do not crop the image.",
         ),
         (
             r"X has (?:588|784|1200|1600) features, but \w+ is expecting (?:196|400)",
@@ -188,7 +188,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"X has (\d+) features, but \w+ is expecting (\d+)",
-            "The network is for images of \\g<2> numbers: give it images of the size that it was trained on.",
+            "The network expects \\g<2> numbers for each image. Use images of the size that it was trained on.",
         ),
         (
             r"cannot reshape array of size 1600 into shape \(20,20(?:,3)?\)",
@@ -222,7 +222,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (r"^ModuleNotFoundError", "Check its spelling, or submit the module's file beside your program."),
         (r"^ValueError: negative seconds|sleep length must be non-negative", "Wait for 0 seconds or more."),
-        (r"^RecursionError", "A function calls itself without end: use a loop, or return before it calls itself."),
+        (r"^RecursionError", "A function calls itself endlessly: use a loop, or return before it calls itself."),
         (
             r"^NameError: name '(\w+)'",
             "Assign a value to \\g<1> above this line, or correct its spelling. If it is a text, put it in quotes.",

@@ -115,7 +115,7 @@ def _explain_missed_zone(sign: str, number: float, readings_before: Floats, zone
         return ""
     minimum, maximum = sorted((float(zone_extreme), float(earlier_extreme)))
     return (
-        f"the loop goes on, because the sensor reads {zone_extreme:.1f} where the robot should stop, and "
+        f"the loop continues, because the sensor reads {zone_extreme:.1f} where the robot should stop, and "
         f"{zone_extreme:.1f} {sign} {number:g} is true. Choose a number between {minimum:.1f} and {maximum:.1f}"
     )
 
@@ -145,7 +145,7 @@ def _hint_about_wrong_word(code: CodeStatements, statement: Statement, end: _Col
         if is_stop
         else f"{word} ends it as soon as {comparison_text} is false"
     )
-    return f"the loop ended over the colour ({colour_text}), because {reason}. Write {other_word} in place of {word}"
+    return f"the loop ended over the colour ({colour_text}), because {reason}. Write {other_word} instead of {word}"
 
 
 _Comparison = tuple[str, str, float, int]

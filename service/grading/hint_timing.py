@@ -28,7 +28,7 @@ def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
             if call.name == "say" and call.arguments and not any("wait" in one for one in call.arguments):
                 arguments = format_arguments(call.arguments)
                 yield (
-                    f"{listing.locate(statement.line)}: the program goes on before the words are spoken. "
+                    f"{listing.locate(statement.line)}: the program continues before the words are spoken. "
                     f"Write say({arguments}, wait=True)"
                 )
                 return

@@ -163,7 +163,7 @@ def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
         if len(loops) == 1:
             listing, statement = loops[0]
             yield (
-                f"{listing.locate(statement.line)}: the loop ends as soon as the edge of the sensor leaves the white: "
+                f"{listing.locate(statement.line)}: the loop ends when the edge of the sensor leaves the white area: "
                 f"it read {other_reading.reading:.2f} %, expected {minimum:g} to {maximum:g} %. Let the robot drive on "
                 "a little after the loop, for example with time.sleep(0.2)"
             )

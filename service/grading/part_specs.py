@@ -31,7 +31,7 @@ def choose_code(
     if source != "student":
         return SourceFile(source, assignment.given_parts[source])
     if submitted_code is None:
-        raise UsageError(f"the submission has no {part_name}; {assignment.id} asks for {file_name}")
+        raise UsageError(f"the submission has no {part_name}; {assignment.id} requires {file_name}")
     return submitted_code
 
 
@@ -57,9 +57,9 @@ def read_head(text: str, assignment: Assignment) -> ProgramHead:
     notes = []
     if "b" in flags.values and settings.background != world.background:
         background = flags.values["b"][:40]
-        notes.append(f"the program asks for the background {background}; the assignment's is {world.background}")
+        notes.append(f"the program selects the floor {background}, but the assignment uses {world.background}")
     if "r" in flags.values and settings.robot != world.robot:
-        notes.append(f"the program asks for the robot {settings.robot}; the assignment's is {world.robot}")
+        notes.append(f"the program selects the robot {settings.robot}, but the assignment uses {world.robot}")
     if flags.values.keys() & {"N", "M"}:
         notes.append("the assignment's noise is used, not the program's -N or -M")
     return ProgramHead(flags, text, tuple(notes))

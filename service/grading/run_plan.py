@@ -344,6 +344,6 @@ def _plan_agents(submission: Submission, assignment: Assignment) -> dict[str, Ag
             code, assignment.given if is_given else collect_files(submission, assignment, source), assignment
         )
         if spec is None:
-            raise UsageError(f"the submission has no agent {name}; {assignment.id} asks for {name}.py")
+            raise UsageError(f"the submission has no agent {name}; {assignment.id} requires {name}.py")
         agents[name] = AgentSpec(spec.code, spec.files, spec.limits, spec.output_bytes, given=is_given)
     return agents

@@ -116,7 +116,7 @@ def require_own_enrolment(session: Session, actor: Actor, course_id: int, *roles
 
 
 def load_names_for_actor(service: Service, actor: Actor, course_id: int) -> HiddenNames:
-    """Return the labels that the actor sees in place of students' names; commands on the machine see every name."""
+    """Return the labels that the actor sees instead of students' names; commands on the machine see every name."""
     return NO_HIDDEN_NAMES if actor.is_machine else load_hidden_names(service.store, course_id)
 
 

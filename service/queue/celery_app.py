@@ -1,4 +1,4 @@
-"""Celery app with settings for which lost, duplicate or late messages do no harm: the database row is the job.
+"""Celery app with settings for which lost, duplicate or late messages are harmless: the database row is the job.
 
 Creates an app from settings without connecting; ``tasks.py`` contains the tasks.
 """

@@ -73,7 +73,7 @@ def grade_next_job(store: Store, settings: Settings, runner: TrialRunner, worker
 
 
 def plot_next_job(store: Store, settings: Settings) -> str | None:
-    """Draw and store the plots that are due longest. Returns the id of their job; None if none is due."""
+    """Draw and store the plots that have been due the longest. Returns the id of their job; None if none is due."""
     job_id = plots.claim_plots(store, settings.job_seconds)
     if job_id is None:
         return None

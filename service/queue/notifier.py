@@ -1,4 +1,4 @@
-"""Notification of workers through the broker. Lost, duplicate or late notifications do no harm.
+"""Notification of workers through the broker. Lost, duplicate or late notifications are harmless.
 
 An unreachable broker or database does not make a notification fail, because its change is already committed: the lease
 reaper notifies again.

@@ -45,7 +45,7 @@ class SupervisedProcess:
 
     @property
     def pid(self) -> int | None:
-        """The process id, if it was started and has not been seen to end."""
+        """The process id; None if the process was not started or its end was detected."""
         return None if self._process is None else self._process.pid
 
     @property

@@ -134,7 +134,7 @@ def run_notified_test(task: WarmTask) -> None:
 
 @shared_task(bind=True, base=WarmTask, name=PLOT_TASK)
 def plot_notified_job(task: WarmTask) -> None:
-    """Draw the plots that are due longest."""
+    """Draw the plots that have been due the longest."""
     from service.queue.grading_job import plot_next_job
 
     child = task.child

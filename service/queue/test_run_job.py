@@ -27,16 +27,16 @@ def run_next_test(store: Store, settings: Settings, runner: TrialRunner) -> bool
     claim = test_runs.claim_test_run(store, settings.lease_seconds)
     if claim is None:
         return True
-    with structlog.contextvars.bound_contextvars(tryout=claim.id, attempt=claim.attempt):
+    with structlog.contextvars.bound_contextvars(test_run=claim.id, attempt=claim.attempt):
         try:
             _run_claimed(store, settings, runner, claim)
         except Cancelled as error:
-            _log.info("tryout.stopped", reason=str(error))
+            _log.info("test_run.stopped", reason=str(error))
         except UsageError as error:
             test_runs.finish_test_run(store, claim, {"refused": str(error)}, None)
         except Exception:
             # This is never the student's fault: their faults are returned as verdicts.
-            _log.exception("tryout.host_error")
+            _log.exception("test_run.host_error")
             test_runs.fail_test_run(
                 store,
                 claim,

@@ -64,11 +64,9 @@ def format_excerpt(diagnosis: Diagnosis) -> list[str]:
 def describe_outcome(grade: Grade, diagnosis: Diagnosis, language: Language = ENGLISH) -> str:
     """Describe how the grade's run ended and who caused it, without repeating the cause."""
     verdict_words = describe_grade(grade, language)
-    return (
-        verdict_words.whose
-        if verdict_words.happened in diagnosis.cause
-        else f"{verdict_words.happened} {verdict_words.whose}"
-    )
+    if verdict_words.happened in diagnosis.cause:
+        return verdict_words.explanation
+    return f"{verdict_words.happened} {verdict_words.explanation}".strip()
 
 
 def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:

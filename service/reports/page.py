@@ -135,7 +135,7 @@ class TextOutput:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Details of one trial of a scenario: the one that lost most. ``where`` identifies it, if there are several."""
+    """Details of a scenario's trial with the most lost marks. ``where`` names the trial if the scenario has several."""
 
     where: str
     plots: tuple[Plot, ...]

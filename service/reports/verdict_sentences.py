@@ -25,11 +25,14 @@ _MEGABYTE = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class VerdictWords:
-    """The words for a verdict. ``short`` fits a table cell; the others are sentences. ``tone`` is the urgency."""
+    """Words for a verdict. ``short`` fits a table cell; the others are sentences. ``tone`` is the urgency.
+
+    A completed run has no ``explanation``.
+    """
 
     short: str
     happened: str
-    whose: str
+    explanation: str
     next_step: str
     tone: Tone
 
@@ -39,7 +42,7 @@ _WORDS: Mapping[Verdict, VerdictWords] = MappingProxyType(
         Verdict.FINISHED: VerdictWords(
             VERDICT_LABELS[Verdict.FINISHED],
             translatable("Your program completed without errors."),
-            translatable("No error stopped it."),
+            "",
             translatable("Compare each criterion with the actions of your robot."),
             "good",
         ),
@@ -164,7 +167,7 @@ def _translate_words(verdict_words: VerdictWords, language: Language) -> Verdict
     return VerdictWords(
         say(verdict_words.short),
         say(verdict_words.happened),
-        say(verdict_words.whose),
+        say(verdict_words.explanation) if verdict_words.explanation else "",
         say(verdict_words.next_step),
         verdict_words.tone,
     )

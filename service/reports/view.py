@@ -79,12 +79,12 @@ NO_OVERLAY = OverlayTrials("", MappingProxyType({}))
 
 
 def build_similarity_view(similarities: Sequence[Similarity], language: Language = ENGLISH) -> SimilarityView:
-    """Return everything."""
+    """Return the view of the similarities for staff."""
     return SimilarityView(tuple(similarities), language)
 
 
 def build_staff_view(grade: Grade, language: Language = ENGLISH) -> View:
-    """Return everything."""
+    """Return the view of a grade for staff, with all its data."""
     criteria = tuple(_add_adjustment(result, language) for result in grade.criteria)
     return View(replace(grade, criteria=criteria), staff=True, withheld=False, language=language)
 

@@ -1,4 +1,4 @@
-"""The robot program's end of the connection to the world: sends actions and asks for values.
+"""The robot program's end of the connection to the world: sends actions and requests values.
 
 This module contains no physics. Positions, sensor values and the time come with the answers, and change only when the
 program waits.
@@ -200,11 +200,11 @@ class Link:
             self._stuck()
 
     def wait(self, seconds: float) -> None:
-        """Let the world move for this time."""
+        """Advance the world by this time."""
         self.wait_units(round(seconds * SECOND))
 
     def wait_units(self, units: int) -> None:
-        """Let the world move for this time in thirds of a microsecond, at most the maximum wait."""
+        """Advance the world by this time in thirds of a microsecond, at most the maximum wait."""
         self._free = 0
         self._send_place()
         self._wire.act(_pack(_WAIT, 0, 0, 0, min(units, MAX_UNITS)))

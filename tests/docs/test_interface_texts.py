@@ -54,5 +54,5 @@ def _is_label(quoted: str) -> bool:
 
 @cache
 def _pattern(text: str) -> str:
-    """Return the regular expression of a text, with anything in place of its parameters."""
+    """Return the regular expression of a text, with anything instead of its parameters."""
     return ".+".join(re.escape(part) for part in re.split(r"%\(\w+\)s", text.rstrip(":")))

@@ -1,4 +1,4 @@
-"""``%sim_data`` and its neighbours: what the robot has logged, and where it was left, as a notebook asks for them.
+"""``%sim_data`` and related magics: the robot's logged data and its last position, for use in a notebook.
 
 The magics that start the robot are not here; they are the worker's.
 """
@@ -22,7 +22,7 @@ class RobotState:
 
 
 def sim_data(words: list[str]) -> pd.DataFrame | None:
-    """The datalog as a long table; with ``--clear`` it and the image log are emptied."""
+    """Return the datalog as a long table. ``--clear`` empties it and the image log."""
     if "-c" in words or "--clear" in words:
         roboSim.clear_datalog()
         return None
@@ -50,7 +50,7 @@ def sim_robot_state(words: list[str]) -> RobotState:
 
 
 def sim_bw_image_data(words: list[str]) -> Any:
-    """One logged image in black and white: ``-i index``, ``-t threshold``, ``-c x1,y1,x2,y2``, ``-n`` (whole)."""
+    """Return a logged image in black and white: ``-i index``, ``-t threshold``, ``-c x1,y1,x2,y2``, ``-n`` (whole)."""
     df = roboSim.image_data()
     if "-r" in words or "--random" in words:
         index = random.randrange(len(df))
@@ -63,7 +63,7 @@ def sim_bw_image_data(words: list[str]) -> Any:
 
 
 def sim_image_pair(words: list[str]) -> Any:
-    """The left and the right image of a logged pair: ``-p index``."""
+    """Return the left and the right image of a logged pair: ``-p index``."""
     return get_sensor_image_pair(roboSim.image_data(), int(_find_option(words, "-p", "--pair", "-1")))
 
 

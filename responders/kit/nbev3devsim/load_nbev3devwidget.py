@@ -29,7 +29,7 @@ class RoboSim:
         self.live_image_handler: Callable[[int], Any] | None = None
 
     def process_raw_image_data(self, raw_data: str, mode: str = "rgb", to_str: bool = True) -> str | list[str]:
-        """Sensor numbers without every fourth (alpha); red alone for greyscale, 0 or 1 for ``bw``."""
+        """Return the sensor values without alpha: red only for greyscale, 0 or 1 for ``bw``."""
         numbers = raw_data.split(",")
         del numbers[3::4]
         if mode in ("reflected", "greyscale"):
@@ -41,7 +41,7 @@ class RoboSim:
         return ",".join(numbers) if to_str else numbers
 
     def image_data(self, datatype: str = "dataframe", mode: str = "rgb") -> Any:
-        """The logged images: a data frame of side, vals and clock, or the raw list.
+        """Return the logged images: a data frame of side, vals and clock, or the raw list.
 
         A notebook asks again and again, so only entries that are new are taken apart.
         """
@@ -73,7 +73,7 @@ class RoboSim:
 
 
 class Eds:
-    """The notebook's display helper: it takes any call and shows nothing."""
+    """The notebook's display helper. It accepts any call and shows nothing."""
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         if name.startswith("__"):

@@ -1,4 +1,4 @@
-"""Stand-ins for what only shows something in a notebook (plots, progress bars, widgets): they take any call.
+"""Placeholders for modules that only show something in a notebook: plots, progress bars, widgets.
 
 Nobody sees a graded notebook, and drawing libraries are not within its sandbox.
 """
@@ -28,7 +28,7 @@ _DISPLAY_LIBRARIES = (
 
 
 class Placeholder:
-    """Stand-in object: every call, attribute or item returns another one."""
+    """Placeholder object: every call, attribute or item returns another placeholder."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Placeholder:
         return Placeholder()
@@ -70,7 +70,7 @@ class Placeholder:
 def _build_subplots(
     nrows: int = 1, ncols: int = 1, *args: Any, squeeze: bool = True, **kwargs: Any
 ) -> tuple[Placeholder, Any]:
-    """A figure, and as many axes as were asked for."""
+    """Return a figure and the requested number of axes."""
     import numpy as np  # here alone: some assignments do without it
 
     axes = np.empty((nrows, ncols), dtype=object)
@@ -126,7 +126,7 @@ def display(*values: Any, **kwargs: Any) -> None:
 
 
 def install_placeholders(shell: Any) -> None:
-    """Let drawing, progress and display modules be imported; ``shell`` is what ``get_ipython()`` gives."""
+    """Make drawing, progress and display modules importable. ``get_ipython()`` returns ``shell``."""
     known: dict[str, dict[str, Any]] = {
         **{f"tqdm{part}": BARS for part in ("", ".auto", ".autonotebook", ".contrib.concurrent", ".notebook", ".std")},
         "IPython": {"get_ipython": lambda: shell},

@@ -1,4 +1,4 @@
-"""Progress bars as notebooks use them, silent: they iterate, and take what else is asked of a bar."""
+"""Silent progress bars with the interface that notebooks use."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 class tqdm:
-    """A bar that is not shown."""
+    """A progress bar that is not shown."""
 
     def __init__(self, iterable: Any = None, desc: str | None = None, total: float | None = None, **_: Any) -> None:
         self._iterable = () if iterable is None else iterable
@@ -52,7 +52,7 @@ class tqdm:
 
     @classmethod
     def pandas(cls, *_: Any, **__: Any) -> None:
-        """Let tables and columns have ``progress_apply`` and ``progress_map``."""
+        """Add ``progress_apply`` and ``progress_map`` to tables and columns."""
         import pandas as pd
 
         for kind in (pd.DataFrame, pd.Series):

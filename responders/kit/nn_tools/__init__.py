@@ -1,6 +1,6 @@
-"""Names of the course's nn_tools that responder code uses; what only draws or animates does nothing here.
+"""Names of the course's nn_tools that responder code uses. Functions that only draw or animate have no effect.
 
-Beyond the course's: ``load_weights``, ``save_weights`` and ``load_onnx`` for networks that are no pickles.
+In addition: ``load_weights``, ``save_weights`` and ``load_onnx`` for networks in formats other than pickle.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""Stand-in for the course's plots of decision boundaries: every function exists, takes any call and draws nothing."""
+"""Placeholders for the course's plots of decision boundaries. Every function accepts any call and draws nothing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Training and asking the course's networks; the images of networks and losses that a notebook shows are left out.
+"""Training and use of the course's networks, without the drawings of networks and losses that a notebook shows.
 
-Predicting divides an image by its brightest pixel, training by its length, as the course does.
+As in the course, predictions divide an image by its brightest pixel, and training divides it by its length.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def class_predict_from_image(
     confidence: bool = False,
     signature: bool = False,
 ) -> Any:
-    """The class that the network gives the image; what ``zoomview`` and ``confidence`` draw is left out."""
+    """Return the predicted class of the image. ``zoomview`` and ``confidence`` draw nothing."""
     values = generate_signature(img, linear=True) if signature else get_image_features(img)
     row = normalize([values], norm="max")
     check_classifier(MLP, len(values))
@@ -68,7 +68,7 @@ def predict_and_report_from_image(
     confidence: bool = False,
     signature: bool = False,
 ) -> None:
-    """Print what the network makes of the image, and whether that is its label."""
+    """Print the predicted class of the image, and whether it equals the label."""
     if jiggled:
         img = jiggle(img)
     if cropzoom:
@@ -108,7 +108,7 @@ def progress_tracked_training(
     structure: bool = False,
     weights: bool = False,
 ) -> Any:
-    """A network trained one pass at a time; ``report`` prints how it names what it was trained on."""
+    """Return a network trained one pass at a time. ``report`` prints its results on the training data."""
     classes = np.unique(labels)
     if MLP is None:
         MLP = MLPClassifier(hidden_layer_sizes=hidden_layer_sizes, max_iter=1)
@@ -138,9 +138,9 @@ def quick_progress_tracked_training(
     image_data: bool = True,
     fill: int = 0,
 ) -> Any:
-    """A network trained on all images but the last tenth; on rows of numbers without ``image_data``.
+    """Return a network trained on all images except the last tenth; on rows of numbers without ``image_data``.
 
-    With ``report`` it prints how the network names those last ones.
+    ``report`` prints its results on the last tenth.
     """
     rows = _build_rows(images_list, size, jiggled, use_signature, fill) if image_data else images_list
     kept = len(rows) - (max(len(rows) // 10, 1) if test_limit is None else test_limit)
@@ -173,7 +173,7 @@ def resized_images_pipeline(
     normalise: bool = True,
     images: bool = True,
 ) -> Any:
-    """The images resized, and cut to black and white at a grey of 100.
+    """Return the images resized and converted to black and white, with a threshold of 100.
 
     With ``images=False`` rows of values, of length 1 unless ``normalise`` is off.
     """
@@ -184,7 +184,7 @@ def resized_images_pipeline(
 
 
 def how_did_I_do(MLP: Any, df: Any, samples: str, expected: str) -> Any:
-    """A table of what the network makes of the column ``samples``, beside the column ``expected``."""
+    """Return a table with the predictions for the column ``samples`` beside the column ``expected``."""
     table = pd.DataFrame({"Expected": df[expected], "Predicted": MLP.predict(df[samples].to_list())})
     table["Correct"] = table["Expected"] == table["Predicted"]
     print(f"The network got {table['Correct'].sum()} out of {len(table)} correct.")
@@ -224,7 +224,7 @@ def generate_N_random_samples(
     use_signature: bool = False,
     fill: int = 0,
 ) -> tuple[list[Any], list[Any]]:
-    """As many rows of pixels, or signatures, and their labels, as ``randfunc(images_array, labels)`` draws."""
+    """Return random rows of pixels, or signatures, with labels. ``randfunc(images_array, labels)`` draws them."""
     drawn = [randfunc(images_array, labels) for _ in range(num_samples)]
     images = [jiggle(image) if jiggled else image for image, _ in drawn]
     images = [crop_and_zoom_to_fit(image) if cropzoom else image for image in images]
@@ -257,7 +257,7 @@ def test_and_report_random_images(
 
 
 def network_structure_report(MLP: Any) -> None:
-    """Print how a trained network is made up."""
+    """Print the structure of a trained network."""
     print(f"Number of input features: {MLP.n_features_in_}")
     print(f"Number of layers: {MLP.n_layers_}")
     print(f"Number of outputs: {MLP.n_outputs_}")
@@ -273,21 +273,21 @@ def network_structure(
     loss: bool = False,
     retval: bool = False,
 ) -> Any:
-    """Print it; with ``retval`` give inputs, layers, outputs and hidden layers. Its drawing is left out."""
+    """Print the structure. With ``retval``, return inputs, layers, outputs and hidden layers. Draws nothing."""
     if report:
         network_structure_report(MLP)
     return (MLP.n_features_in_, MLP.n_layers_, MLP.n_outputs_, MLP.hidden_layer_sizes) if retval else None
 
 
 def reshape_data(img: Any, n_images: int = 3000, size: tuple[int, int] = (28, 28)) -> tuple[Any, Any, Any]:
-    """The images as an array, as ``n_images`` rows of numbers, and as rows divided by their largest number."""
+    """Return the images as an array, as ``n_images`` rows of numbers, and as rows divided by their largest number."""
     images = np.array(img)
     rows = images.reshape(n_images, size[0] * size[1])
     return images, rows, normalize(rows, norm="max", axis=1)
 
 
 def _show_nothing(*_args: Any, **_kwargs: Any) -> None:
-    """Draws in a notebook; nothing here."""
+    """Placeholder for a function that draws in a notebook."""
 
 
 show_loss = preview_weights = multiply_image_by_weights = _show_nothing
@@ -298,7 +298,7 @@ def cnn_load(
     fpath: str | os.PathLike[str] = "./mnist.tflite",
     fpath_labels: str | os.PathLike[str] | None = "./mnist_tflite_labels.txt",
 ) -> CNN:
-    """The network in a file of TensorFlow Lite's format, and its labels, one on each line of a file.
+    """Return the network of a TensorFlow Lite file, and its labels from a file with one per line.
 
     Raises ValueError with a sentence when the file is no such network, ImportError when ai-edge-litert is missing.
     """
@@ -335,7 +335,7 @@ def _read_details(cnn: CNN) -> Details:
 
 
 def cnn_rank_results(results: NDArray[Any], tf_labels: Sequence[str] | None = None, rank: Any = 5) -> None:
-    """Print the likeliest classes, the best first; the original divides by 255 where their numbers add up to 0 or 1."""
+    """Print the likeliest classes, best first; divided by 255 if their numbers add up to 0 or 1, as in the original."""
     best = results.argsort()[::-1][: rank if isinstance(rank, int) else 5]
     whole = 1 if best.sum() > 1 else 255
     for number in best:
@@ -345,7 +345,7 @@ def cnn_rank_results(results: NDArray[Any], tf_labels: Sequence[str] | None = No
 def cnn_test_with_image(
     cnn: CNN, img: Image.Image, tf_labels: Sequence[str] = "", retval: bool = False, rank: int | None = None
 ) -> NDArray[Any] | None:
-    """Return the network's output for the resized image, with ``retval``. Prints the ``rank`` likeliest classes."""
+    """Return the network's output for the resized image, with ``retval``. Prints the ``rank`` most likely classes."""
     interpreter, labels = cnn
     inputs, outputs, is_float, height, width = _read_details(cnn)
     shape, kind = inputs[0]["shape"], inputs[0]["dtype"]

@@ -1,4 +1,4 @@
-"""From the numbers that the robot's light sensors send to images, and what the course does with those.
+"""Conversion of light sensor values to images, and the course's image processing.
 
 Images are Pillow's, values 0 to 255; functions that only show something return None.
 """
@@ -22,7 +22,7 @@ _SIZE = (20, 20, 3)
 
 
 def load_MNIST_images_array(fn: str = "mnist_batch_0.png") -> np.ndarray:
-    """A strip of 28 x 28 images under each other as an array (n, 28, 28)."""
+    """Return a vertical strip of 28 x 28 images as an array (n, 28, 28)."""
     return np.asarray(Image.open(fn).convert("L")).reshape(-1, 28, 28)
 
 
@@ -34,13 +34,13 @@ def load_MNIST_labels(fn: str = "labels.txt") -> list[int]:
 def load_MNIST_images_and_labels(
     images_file: str = "mnist_batch_0.png", labels_file: str = "labels.txt", images: bool = True
 ) -> tuple[Any, list[int]]:
-    """Images (a list, or an array with ``images=False``) and their labels."""
+    """Return images (a list, or an array with ``images=False``) and their labels."""
     array = load_MNIST_images_array(images_file)
     return (get_images_list_from_images_array(array) if images else array), load_MNIST_labels(labels_file)
 
 
 def report_light_sensor(state: Any, side: str = "left") -> None:
-    """Print what the simulator's state says of one light sensor."""
+    """Print the simulator's values of one light sensor."""
     values = getattr(state, "state", state)
     print(
         f"{side.capitalize()} light sensor:",
@@ -50,7 +50,7 @@ def report_light_sensor(state: Any, side: str = "left") -> None:
 
 
 def sensor_image_focus(img: Image.Image, centre: Box = _FOCUS, resize: Any = None, bw: bool = False) -> Image.Image:
-    """The part of a sensor image that lies inside the round window: 14 x 14 pixels by default."""
+    """Return the part of a sensor image inside the round window: 14 x 14 pixels by default."""
     size = img.size
     img = img.crop(centre)
     if resize is not None:
@@ -61,7 +61,7 @@ def sensor_image_focus(img: Image.Image, centre: Box = _FOCUS, resize: Any = Non
 def get_sensor_image_pair(
     image_data: pd.DataFrame, index: int | None = None, mode: str = "greyscale", threshold: int = 127
 ) -> tuple[Image.Image, Image.Image] | None:
-    """The left and the right focus image of pair ``index`` (rows 2i and 2i+1), -1 for the last pair."""
+    """Return the left and the right focus image of pair ``index`` (rows 2i and 2i+1), -1 for the last pair."""
     if image_data.empty:
         return None
     if index is None or index == -1:
@@ -79,7 +79,7 @@ def get_sensor_image_pair(
 def get_random_image(
     images_array: Any, labels: Sequence[Any] | None = None, show: bool = False, index: int | None = None
 ) -> tuple[Image.Image, Any]:
-    """An image and its label, by chance unless ``index`` is given, of a list of images or an array of them."""
+    """Return an image and its label from a list or an array of images, at random unless ``index`` is given."""
     place = random.randrange(len(images_array)) if index is None else index
     label = None if labels is None else labels[place]
     if show:
@@ -88,12 +88,12 @@ def get_random_image(
 
 
 def as_image(image: Any) -> Image.Image:
-    """An image as it is, of an array one of greys."""
+    """Return an image unchanged, or convert an array to a greyscale image."""
     return image if isinstance(image, Image.Image) else image_from_array(image)
 
 
 def image_data_to_array(image_data: Sequence[Any], index: int = 0, size: tuple[int, ...] = _SIZE) -> np.ndarray:
-    """A list of numbers as an array of bytes of the given shape."""
+    """Return a list of numbers as an array of bytes with the given shape."""
     return np.array(list(image_data)).reshape(size).astype(np.uint8)
 
 
@@ -102,7 +102,7 @@ def get_resized_images_array(images_array: Any, size: tuple[int, int] = (20, 20)
 
 
 def array_from_image(img: Image.Image, size: tuple[int, int] = (28, 28)) -> np.ndarray:
-    """The pixels of an ``L`` image as bytes, shape (height, width) for a ``size`` of (width, height)."""
+    """Return the pixels of an ``L`` image as bytes, shape (height, width) for a ``size`` of (width, height)."""
     return np.asarray(img.convert("L"), dtype=np.uint8).reshape(size[1], size[0])
 
 
@@ -115,32 +115,32 @@ def image_from_array(image_array: np.ndarray, mode: str = "L") -> Image.Image:
 
 
 def image_data_from_image(img: Image.Image) -> list[int]:
-    """The pixels of an ``L`` image, row by row."""
+    """Return the pixels of an ``L`` image, row by row."""
     return [int(value) for value in np.asarray(img.convert("L")).ravel()]
 
 
 def df_from_image(img: Image.Image, show: bool = True, colorTheme: str = "Blues") -> pd.DataFrame:
-    """A data frame with one cell a pixel."""
+    """Return a data frame with one cell for each pixel."""
     return pd.DataFrame(np.asarray(img.convert("L")).astype(int))
 
 
 def image_from_df(df: Any) -> Image.Image:
-    """The image that a data frame has the pixels of; an image is one already."""
+    """Return the image of a data frame of pixels. An image is returned unchanged."""
     return as_image(df.to_numpy() if isinstance(df, pd.DataFrame) else df)
 
 
 def style_df(df: pd.DataFrame, bw: bool = False, colorTheme: str = "Blues", threshold: int = 127) -> None:
-    """Shows colours in a notebook; nothing here."""
+    """Placeholder for a function that shows colours in a notebook."""
 
 
 def zoom_img(img: Any, size: tuple[int, int] = (5, 5), grid: bool = True) -> None:
-    """Shows an image enlarged in a notebook; nothing here."""
+    """Placeholder for a function that enlarges an image in a notebook."""
 
 
 def raw_image_data_to_array(
     tmp: Any, index: int = 0, size: tuple[int, ...] = _SIZE, col: str = "vals"
 ) -> np.ndarray | None:
-    """The numbers of row ``index`` of a data frame or list as an array of bytes."""
+    """Return the numbers of row ``index`` of a data frame or list as an array of bytes."""
     if index >= len(tmp):
         print(f"There are only {len(tmp)} images: index {index} is too high.")
         return None
@@ -150,7 +150,7 @@ def raw_image_data_to_array(
 
 
 def collected_image(df: Any, index: int = 0, size: tuple[int, ...] = _SIZE) -> Image.Image | None:
-    """The logged image in row ``index``, in colour."""
+    """Return the logged image in row ``index``, in colour."""
     array = raw_image_data_to_array(df, index, size)
     return None if array is None else Image.fromarray(array)
 
@@ -165,7 +165,7 @@ def generate_image(
     fill: int = 255,
     threshold: int = 127,
 ) -> Image.Image:
-    """The logged image in row ``index``: greyscale, ``bw``, or colour for any other mode; cropped, then resized."""
+    """Return the logged image in row ``index``: greyscale, ``bw``, or else colour; cropped, then resized."""
     image = collected_image(image_data_df, index, size)
     if image is None:
         raise IndexError(f"there is no image {index}")
@@ -181,7 +181,7 @@ def generate_image(
 
 
 def make_image_black_and_white(img: Image.Image, threshold: int = 127) -> Image.Image:
-    """White where the grey is above the threshold, black elsewhere (mode ``1``)."""
+    """Return the image in mode ``1``: white if the grey level is above the threshold, otherwise black."""
     return img.convert("L").point(lambda grey: 255 if grey > threshold else 0).convert("1")
 
 
@@ -199,7 +199,7 @@ def generate_bw_image(
 def generate_signature_from_series(
     s: Sequence[int], fill: int = 255, threshold: int = 127, binarise: bool = False
 ) -> list[int]:
-    """Transitions, first value, longest run of white, longest run of black."""
+    """Return the transitions, first value, longest run of white, and longest run of black."""
     values = [int(value) for value in s]
     if binarise:
         values = [255 if value > threshold else 0 for value in values]
@@ -223,7 +223,7 @@ def generate_signature(
     fill: int = 255,
     show: bool = False,
 ) -> Any:
-    """Four numbers a row of the black-and-white image, as a data frame, or flat with ``linear``.
+    """Return four numbers for each row of the black-and-white image, as a data frame, or flat with ``linear``.
 
     ``segment`` is a row, or rows, to leave out; of a flat one ``normalise`` makes a row of length 1.
     """
@@ -244,14 +244,14 @@ def generate_signature(
 def get_image_from_state(
     data: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB", zoom: bool = True
 ) -> Image.Image:
-    """The image in a sensor's raw string, alpha included."""
+    """Return the image in a sensor's raw string, including alpha."""
     return Image.fromarray(image_data_to_array([int(number) for number in data.split(",")], size=size)).convert(mode)
 
 
 def preview_state_image(
     data: str, size: tuple[int, ...] = (20, 20, 4), mode: str = "RGB", zoom: bool = True, retval: bool = True
 ) -> Image.Image | None:
-    """Return the image in a sensor's raw string, or None with ``retval`` off. Shown only in a notebook."""
+    """Return the image in a sensor's raw string, or None without ``retval``. Shows nothing."""
     return get_image_from_state(data, size, mode) if retval else None
 
 
@@ -262,7 +262,7 @@ def background_column(s: Sequence[int], background: int = 255, threshold: Any = 
 def clear_columns(
     df: pd.DataFrame, reverse: bool = False, transpose: bool = False, background: int = 255, threshold: Any = None
 ) -> pd.DataFrame:
-    """Without the columns of background at the left; at the right with ``reverse``; of rows with ``transpose``."""
+    """Remove background columns at the left; at the right with ``reverse``; rows with ``transpose``."""
     table = df.T if transpose else df
     inside = np.flatnonzero((table.to_numpy() != background).any(axis=0))
     if inside.size:
@@ -279,7 +279,7 @@ def trim_image(
     image: bool = False,
     threshold: Any = False,
 ) -> Any:
-    """Without the rows and columns of background round the edge.
+    """Return the image without background rows and columns at the edges.
 
     Of an image an image; of a data frame one, with the old names of its rows and columns unless ``reindex``, or an
     image if that is asked for.
@@ -296,7 +296,7 @@ def trim_image(
 def crop_and_pad_to_fit(
     img: Image.Image, background: int = 255, scale: float = 1, quiet: bool = True, threshold: Any = None
 ) -> Image.Image:
-    """The trimmed image in the middle of a canvas of the old size."""
+    """Return the trimmed image in the middle of a canvas of the old size."""
     trimmed = trim_image(img, background)
     canvas = Image.new("L", img.size, background)
     canvas.paste(trimmed, ((img.size[0] - trimmed.size[0]) // 2, (img.size[1] - trimmed.size[1]) // 2))
@@ -304,13 +304,13 @@ def crop_and_pad_to_fit(
 
 
 def crop_and_zoom_to_fit(img: Image.Image, background: int = 0, scale: float = 1, quiet: bool = True) -> Image.Image:
-    """The trimmed image enlarged to the old size."""
+    """Return the trimmed image enlarged to the old size."""
     zoomed: Image.Image = trim_image(img, background).resize(img.size, Image.Resampling.LANCZOS)
     return zoomed
 
 
 def jiggle(img: Image.Image, background: int = 0, quiet: bool = True) -> Image.Image:
-    """The trimmed image somewhere on a canvas of the old size."""
+    """Return the trimmed image at a random position on a canvas of the old size."""
     trimmed = trim_image(img, background)
     canvas = Image.new("L", img.size, background)
     places = [random.randint(0, max(img.size[axis] - trimmed.size[axis], 0)) for axis in (0, 1)]
@@ -323,7 +323,7 @@ def get_image_features(image: Image.Image) -> list[int]:
 
 
 def get_images_features(images_list: Sequence[Image.Image], normalise: bool = True) -> Any:
-    """One row of pixel values an image, of length 1 unless ``normalise`` is off."""
+    """Return one row of pixel values for each image, with length 1 unless ``normalise`` is false."""
     rows = [get_image_features(image) for image in images_list]
     return _normalise_rows(rows, "l2") if normalise else rows
 

@@ -1,4 +1,4 @@
-"""Stand-in for the drawings of networks: every function exists, takes any call and draws nothing."""
+"""Placeholders for drawings of networks. Every function accepts any call and draws nothing."""
 
 from __future__ import annotations
 

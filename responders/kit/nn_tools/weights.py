@@ -1,6 +1,6 @@
-"""Your own networks from files that are no pickles: plain weights (``.npz``) and ONNX.
+"""Your own networks from files without pickles: plain weights (``.npz``) and ONNX.
 
-Both answer to ``predict`` and ``predict_proba`` as scikit-learn's do. Nothing here trains a network.
+Both have ``predict`` and ``predict_proba`` as in scikit-learn. This module trains no networks.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _ACTIVATIONS: Mapping[str, Callable[[Numbers], Numbers]] = MappingProxyType(
 
 
 class WeightsNetwork:
-    """A multi-layer perceptron from its weights: layer after layer, softmax at the end."""
+    """A multi-layer perceptron from its weights, with softmax as its last step."""
 
     def __init__(
         self, coefs: list[Numbers], intercepts: list[Numbers], activation: str, classes: NDArray[Any], name: str
@@ -45,19 +45,19 @@ class WeightsNetwork:
         self._name = name
 
     def predict_proba(self, images: Any) -> Numbers:
-        """How likely each class is, shape (images, classes); ``images`` has one row of numbers an image."""
+        """Return class probabilities, shape (images, classes). ``images`` has one row of numbers for each image."""
         values = _to_rows(images, self.n_features_in_, self._name)
         for coefs, intercepts in zip(self.coefs_[:-1], self.intercepts_[:-1], strict=True):
             values = _ACTIVATIONS[self.activation](values @ coefs + intercepts)
         return _compute_softmax(values @ self.coefs_[-1] + self.intercepts_[-1])
 
     def predict(self, images: Any) -> NDArray[Any]:
-        """The likeliest class of each image, shape (images,)."""
+        """Return the most likely class of each image, shape (images,)."""
         return np.asarray(self.classes_[self.predict_proba(images).argmax(axis=1)])
 
 
 class OnnxNetwork:
-    """A network in ONNX's format with one input of images and one output of a number a class."""
+    """An ONNX network with one input for images and one output with a number for each class."""
 
     def __init__(self, session: Any, classes: Any, name: str) -> None:
         self._session, self._name = session, name
@@ -74,7 +74,7 @@ class OnnxNetwork:
         self.classes_ = None if classes is None else np.asarray(classes)
 
     def predict_proba(self, images: Any) -> Numbers:
-        """How likely each class is, shape (images, classes); scores that are no shares go through softmax."""
+        """Return class probabilities, shape (images, classes). Other scores are converted with softmax."""
         rows = _to_rows(images, self.n_features_in_, self._name).astype(np.float32)
         output = self._session.run(self._outputs, {self._input: rows.reshape(-1, *self._shape)})[-1]
         scores = np.asarray(output, np.float64)
@@ -84,13 +84,13 @@ class OnnxNetwork:
         return scores if shares else _compute_softmax(scores)
 
     def predict(self, images: Any) -> NDArray[Any]:
-        """The likeliest class of each image: its number, or its name if ``classes`` were given."""
+        """Return the most likely class of each image: its number, or its name if ``classes`` is given."""
         best = self.predict_proba(images).argmax(axis=1)
         return best if self.classes_ is None else np.asarray(self.classes_[best])
 
 
 def load_weights(file: str | os.PathLike[str]) -> WeightsNetwork:
-    """The network in a ``.npz`` file with ``coefs_0``, ``intercepts_0``, ``coefs_1`` ..., ``activation``, ``classes``.
+    """Load a network from a ``.npz`` file: ``coefs_0``, ``intercepts_0``, ``coefs_1`` ..., ``activation``, ``classes``.
 
     ``coefs_i`` has shape (inputs, outputs) of layer i, ``intercepts_i`` shape (outputs,); ``activation`` is relu, tanh,
     logistic or identity, between layers; ``classes`` has one entry for each output of the last layer.
@@ -124,7 +124,7 @@ def save_weights(network: Any, file: str | os.PathLike[str]) -> None:
 
 
 def load_onnx(file: str | os.PathLike[str], classes: Any = None) -> OnnxNetwork:
-    """The network in an ``.onnx`` file; ``classes`` are the names of its outputs, numbers from 0 if not given.
+    """Load the network from an ``.onnx`` file. ``classes`` are the names of its outputs, by default numbers from 0.
 
     Raises ValueError with a sentence when the file is no such network.
     """
@@ -147,7 +147,7 @@ def load_onnx(file: str | os.PathLike[str], classes: Any = None) -> OnnxNetwork:
 
 
 def check_classifier(network: Any, inputs: int) -> None:
-    """Raises TypeError for a network that gives no class, ValueError for one of images of another size."""
+    """Raise TypeError if the network predicts no class, and ValueError if its image size differs."""
     kind = type(network).__name__
     if _is_regressor(network):
         raise TypeError(

@@ -79,7 +79,7 @@ def _start_session(changed_signals: tuple[int, ...]) -> None:
 
 
 def _raise_oom_score() -> None:
-    """Let the kernel kill this child before its zygote when memory runs out.
+    """Make the kernel kill this child before its zygote when memory runs out.
 
     The /proc files of a non-dumpable process, such as the zygote, belong to root. So this process is dumpable until it
     is locked down.
@@ -188,7 +188,7 @@ def _open_memory() -> int | None:
 
 
 def _activate_doorkeeper(memory: int | None) -> str | None:
-    """Let the doorkeeper decide about every path. Return the reason if that fails, otherwise None."""
+    """Activate the doorkeeper, which checks every path. Return the reason if that fails, otherwise None."""
     if memory is None:
         return "/proc/self/mem cannot be opened"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET, fileno=_DOOR) as door:

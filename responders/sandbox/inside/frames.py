@@ -1,6 +1,6 @@
 """The child's end of the wire: JSON lines over two pipes, with packed actions of a robot program between them.
 
-The worker validates every frame as untrusted input. Nothing here protects it.
+The worker validates every frame as untrusted input. This module does not protect the worker.
 """
 
 from __future__ import annotations

@@ -188,7 +188,7 @@ def restrict_system_calls() -> None:
 
 
 def install_path_filter() -> int:
-    """Let every system call with a path wait for a decision. Return the descriptor for the decisions.
+    """Suspend every system call with a path until a decision. Return the descriptor for the decisions.
 
     Raises:
         LayerMissing: If the kernel doesn't support it, or an outer process already decides for this one.

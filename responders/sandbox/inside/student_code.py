@@ -162,7 +162,7 @@ class TextStream:
         """Do nothing: no output is buffered."""
 
     def isatty(self) -> bool:
-        """Return False: the output is no terminal."""
+        """Return False: the output is not a terminal."""
         return False
 
     def writable(self) -> bool:

@@ -157,7 +157,7 @@ def _reap(control: socket.socket, pid: int) -> None:
 
 
 def _raise_oom_score() -> None:
-    """Let the kernel kill children first when memory runs out, then the zygote, and the worker last."""
+    """Make the kernel kill children first when memory runs out, then the zygote, and the worker last."""
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
         score.write("700")
 

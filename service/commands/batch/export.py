@@ -15,7 +15,9 @@ from service.commands.output import is_json_output
 
 def export(
     batch: BatchId,
-    form: Annotated[str, create_format_option("What to write; a wrong one names them all.", _list_formats)] = "csv",
+    form: Annotated[
+        str, create_format_option("Output format. An unknown format lists the available ones.", _list_formats)
+    ] = "csv",
     output: Annotated[
         Path | None,
         typer.Option(

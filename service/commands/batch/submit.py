@@ -34,9 +34,9 @@ def submit(
 ) -> None:
     """Queue a submission for each student. Invalid submissions are listed and do not affect the others.
 
-    Downloads from Moodle, Gradescope and nbgrader work unchanged. A roster has the columns student (or id), file
-    and, where it has them, name, email, assignment; files lie below it. A student's newest submission replaces one
-    that still waits, and the same one again changes nothing.
+    Downloads from Moodle, Gradescope and nbgrader work unchanged. A roster has the columns student (or id) and file,
+    and optionally name, email and assignment. Its files are in the roster's folder or below. A student's new
+    submission replaces one in the queue. An unchanged submission is not graded again.
 
     Exit status 0 if all were accepted (and, with --wait, graded), 2 if some were rejected, 3 if some could not be
     graded.

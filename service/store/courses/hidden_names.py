@@ -24,7 +24,7 @@ _LABEL_LENGTH = 6
 
 @dataclass(frozen=True, slots=True)
 class HiddenNames:
-    """Assignments of a course that show labels in place of names."""
+    """Assignments of a course that show labels instead of names."""
 
     assignments: frozenset[str]
     key: bytes

@@ -1,6 +1,6 @@
 """Deadlines and attempts: the policy of a course, extensions of students, and their effects.
 
-A submission over a limit is stored and can be marked, but only staff see it. Nothing here rejects a submission.
+A submission over a limit is stored and can be marked, but only staff see it. This module rejects no submissions.
 """
 
 from __future__ import annotations

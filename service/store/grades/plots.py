@@ -24,9 +24,9 @@ _PREFIX, _SUFFIX = "plot-", ".png"
 
 @retry_conflicts
 def claim_plots(store: Store, lease_seconds: float) -> str | None:
-    """Claim the job whose plots are due longest; None if no plots are due.
+    """Claim the job whose plots have been due the longest; None if no plots are due.
 
-    Drawing twice does no harm, so a claim is only postponed, not fenced. The plots fail after three attempts.
+    Drawing twice is harmless, so a claim is only postponed, not fenced. The plots fail after three attempts.
     """
     with store.transaction() as session:
         if needs_newer_code(session):

@@ -1,6 +1,6 @@
 """Storage of complete grades as rows: marks, evidence, accuracy, and each recording as an artifact.
 
-``jobs`` decides whether a worker may store a grade. Nothing here judges.
+``jobs`` decides whether a worker may store a grade. This module does not judge.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ class AssignmentShape(Shape):
     )
 
 
-class AssignmentAsked(BaseModel):
+class AssignmentBody(BaseModel):
     """The assignment of the catalogue to prepare."""
 
     assignment: str = Field(min_length=1, max_length=100, examples=["shape-recognition"])
@@ -154,7 +154,7 @@ class PreviewShape(Shape):
     model_config = build_example_config(job="7xk2v9q4m0ab")
 
 
-class NamesAsked(BaseModel):
+class NamesBody(BaseModel):
     """Visibility of names during marking."""
 
     names_hidden: bool
@@ -205,10 +205,10 @@ def list_assignments(
 
 
 @router.post("/courses/{course_id}/assignments", status_code=201)
-def prepare(access: ManageAccess, context: Context, asked: AssignmentAsked) -> AssignmentShape:
+def prepare(access: ManageAccess, context: Context, body: AssignmentBody) -> AssignmentShape:
     """Add an assignment of the catalogue to the course without opening it, or update it to the newest version."""
     assignment = assignment_uploads.prepare_from_catalogue(
-        context.service, access.actor, access.course_id, asked.assignment
+        context.service, access.actor, access.course_id, body.assignment
     )
     return AssignmentShape.model_validate(assignment)
 
@@ -272,9 +272,9 @@ def remove(access: ManageAccess, context: Context, assignment: AssignmentId) -> 
 
 
 @router.post("/courses/{course_id}/assignments/{assignment}/names")
-def hide_names(access: ManageAccess, context: Context, assignment: AssignmentId, asked: NamesAsked) -> AssignmentShape:
+def hide_names(access: ManageAccess, context: Context, assignment: AssignmentId, body: NamesBody) -> AssignmentShape:
     """Hide or show the students' names during marking."""
-    names_hidden = asked.names_hidden
+    names_hidden = body.names_hidden
     course_assignment = assignments.hide_names(
         context.service, access.actor, access.course_id, assignment, names_hidden=names_hidden
     )

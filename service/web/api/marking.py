@@ -112,7 +112,7 @@ class MarkingShape(Shape):
     )
 
 
-class MarksAsked(BaseModel):
+class MarksBody(BaseModel):
     """Marks that replace the grader's marks (null excuses the criterion), and a reason that students can read."""
 
     marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
@@ -120,7 +120,7 @@ class MarksAsked(BaseModel):
     seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)
 
 
-class CommentAsked(BaseModel):
+class CommentBody(BaseModel):
     """A comment to the student."""
 
     criterion: str = Field("", max_length=200)
@@ -157,7 +157,7 @@ class AppealShape(Shape):
     )
 
 
-class TextAsked(BaseModel):
+class TextBody(BaseModel):
     """Text of an appeal, or of its answer."""
 
     text: str = Field(min_length=1, max_length=MAX_TEXT_LENGTH, examples=["Please look at the last shape again."])
@@ -171,10 +171,10 @@ def marking(access: ReadAccess, context: Context, job_id: RowName) -> MarkingSha
 
 @router.put(GRADE_PATH + "/marking/{criterion}")
 def set_marks(
-    access: MarkAccess, context: Context, job_id: RowName, criterion: CriterionId, asked: MarksAsked
+    access: MarkAccess, context: Context, job_id: RowName, criterion: CriterionId, body: MarksBody
 ) -> MarkingShape:
     """Adjust the marks of a criterion of this submission, or excuse it. Regrades keep the adjustment."""
-    marks_request = MarksRequest(criterion, asked.marks, asked.reason, asked.seen)
+    marks_request = MarksRequest(criterion, body.marks, body.reason, body.seen)
     return MarkingShape.model_validate(
         grades.set_marks(context.service, access.actor, access.course_id, job_id, marks_request)
     )
@@ -194,9 +194,9 @@ def withdraw(
 
 
 @router.post(GRADE_PATH + "/comments", status_code=201)
-def comment(access: MarkAccess, context: Context, job_id: RowName, asked: CommentAsked) -> MarkingShape:
+def comment(access: MarkAccess, context: Context, job_id: RowName, body: CommentBody) -> MarkingShape:
     """Add a comment to the student."""
-    comment_request = CommentRequest(asked.text, asked.criterion)
+    comment_request = CommentRequest(body.text, body.criterion)
     return MarkingShape.model_validate(
         grades.add_comment(context.service, access.actor, access.course_id, job_id, comment_request)
     )
@@ -233,9 +233,9 @@ def list_appeals(
 
 
 @router.post("/courses/{course_id}/appeals/{appeal_id}/answer", status_code=204)
-def answer(access: MarkAccess, context: Context, appeal_id: RowNumber, asked: TextAsked) -> None:
+def answer(access: MarkAccess, context: Context, appeal_id: RowNumber, body: TextBody) -> None:
     """Answer an open appeal and close it."""
-    appeals.answer(context.service, access.actor, access.course_id, appeal_id, asked.text)
+    appeals.answer(context.service, access.actor, access.course_id, appeal_id, body.text)
 
 
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/appeals")
@@ -245,9 +245,9 @@ def own_appeals(access: StudentReadAccess, context: Context, submission_id: RowN
 
 
 @router.post("/courses/{course_id}/mine/submissions/{submission_id}/appeals", status_code=201)
-def ask(access: OwnerAccess, context: Context, submission_id: RowNumber, asked: TextAsked) -> Listed[AppealShape]:
+def ask(access: OwnerAccess, context: Context, submission_id: RowNumber, body: TextBody) -> Listed[AppealShape]:
     """Appeal a grade."""
-    appeals.submit(context.service, access.actor, access.course_id, submission_id, asked.text)
+    appeals.submit(context.service, access.actor, access.course_id, submission_id, body.text)
     return _list_own_appeals(context, access, submission_id)
 
 

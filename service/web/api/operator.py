@@ -32,7 +32,7 @@ class LaneShape(Shape):
     oldest_seconds: float = Field(description="Waiting time of the oldest job that a worker can claim, in seconds.")
 
 
-class TryoutLaneShape(Shape):
+class TestRunQueueShape(Shape):
     """Load of the test run queue."""
 
     queued: int
@@ -55,7 +55,7 @@ class ServiceShape(Shape):
     ready: bool
     lanes: list[LaneShape]
     findings: list[FindingShape]
-    tryouts: TryoutLaneShape
+    tryouts: TestRunQueueShape
     dead: int = Field(description="Number of failed jobs.")
     host_faults: int = Field(description="Number of grading attempts that failed because of the system, for all jobs.")
     paused_batches: int
@@ -126,7 +126,7 @@ class DeadShape(Shape):
     )
 
 
-class RetryAsked(BaseModel):
+class RetryBody(BaseModel):
     """Selection of failed jobs to queue again."""
 
     batch_id: str | None = Field(None, max_length=32, pattern="^[0-9a-z]+$", description="Null for all batches.")
@@ -143,7 +143,7 @@ class NamedCourseShape(Shape):
     model_config = build_example_config(id=1, name="TM129", instructors=2, students=180)
 
 
-class InstructorAsked(BaseModel):
+class InstructorBody(BaseModel):
     """A new instructor of a course. A missing course is created."""
 
     course: str = Field(min_length=1, max_length=100, pattern=r"\S", examples=["TM129"])
@@ -193,7 +193,7 @@ def service(operator: ReadAccess, context: Context) -> ServiceShape:
             for lane in JobQueue
         ],
         findings=[FindingShape.model_validate(finding) for finding in view.findings],
-        tryouts=TryoutLaneShape.model_validate(view.test_runs),
+        tryouts=TestRunQueueShape.model_validate(view.test_runs),
         dead=view.failed_count,
         host_faults=metrics.host_faults,
         paused_batches=metrics.paused_batches,
@@ -231,9 +231,9 @@ def list_courses(operator: ReadAccess, context: Context) -> Listed[NamedCourseSh
 
 
 @router.post("/operator/courses", status_code=201, openapi_extra=dict(NO_KEY))
-def add_instructor(operator: ManageAccess, context: Context, asked: InstructorAsked) -> NewInstructorShape:
+def add_instructor(operator: ManageAccess, context: Context, body: InstructorBody) -> NewInstructorShape:
     """Add an instructor to a course and return a single-use sign-in link. Creates the course if it does not exist."""
-    request = MemberRequest(asked.course, asked.id, asked.name)
+    request = MemberRequest(body.course, body.id, body.name)
     added_member = courses.add_member(context.service, operator.actor, request)
     return NewInstructorShape(
         id=added_member.member.id,
@@ -255,7 +255,7 @@ def list_dead(operator: ReadAccess, context: Context) -> Listed[DeadShape]:
 
 
 @router.post("/operator/retry")
-def retry(operator: ManageAccess, context: Context, asked: RetryAsked | None = None) -> RetriedShape:
+def retry(operator: ManageAccess, context: Context, body: RetryBody | None = None) -> RetriedShape:
     """Queue the failed jobs of one batch or of all batches again."""
-    batch_id = None if asked is None else asked.batch_id
+    batch_id = None if body is None else body.batch_id
     return RetriedShape.model_validate(batches.retry_dead(context.service, operator.actor, batch_id))

@@ -48,7 +48,7 @@ class PersonShape(Shape):
     )
 
 
-class SignOutAsked(BaseModel):
+class SignOutBody(BaseModel):
     """Options for signing a person out."""
 
     release: bool = Field(
@@ -64,7 +64,7 @@ class SignedOutShape(Shape):
     model_config = build_example_config(ended=3)
 
 
-class JoinAsked(BaseModel):
+class JoinBody(BaseModel):
     """The other person to merge."""
 
     other: int = Field(ge=1, le=2**31 - 1, description="ID of one of their enrolments.", examples=[4])
@@ -86,18 +86,18 @@ def find(
 
 @router.post("/operator/people/{member_id}/sign-out")
 def sign_out(
-    operator: ManageAccess, context: Context, member_id: RowNumber, asked: SignOutAsked | None = None
+    operator: ManageAccess, context: Context, member_id: RowNumber, body: SignOutBody | None = None
 ) -> SignedOutShape:
     """End all links, sessions and tokens of a person."""
-    release = asked is not None and asked.release
+    release = body is not None and body.release
     return SignedOutShape(ended=people.sign_out(context.service, operator.actor, member_id, release=release))
 
 
 @router.post("/operator/people/{member_id}/join")
-def join(operator: ManageAccess, context: Context, member_id: RowNumber, asked: JoinAsked) -> PersonShape:
+def join(operator: ManageAccess, context: Context, member_id: RowNumber, body: JoinBody) -> PersonShape:
     """Merge two persons in different courses into one, and sign both out."""
     actor = operator.actor
-    people.join(context.service, actor, JoinRequest(member_id, asked.other, asked.from_platform))
+    people.join(context.service, actor, JoinRequest(member_id, body.other, body.from_platform))
     return _to_person_shape(people.show(context.service, actor, member_id))
 
 

@@ -90,7 +90,7 @@ class StudentShape(MemberShape):
     )
 
 
-class StudentAsked(BaseModel):
+class StudentBody(BaseModel):
     """A student to enrol, or an enrolled student whose name or e-mail address is to be updated."""
 
     id: str = Field(min_length=1, max_length=200, examples=["ada"])
@@ -98,10 +98,10 @@ class StudentAsked(BaseModel):
     email: str = Field("", max_length=200, examples=["ada@example.org"])
 
 
-class EnrolAsked(BaseModel):
+class EnrolBody(BaseModel):
     """Students to enrol. If one of them is invalid, none is enrolled."""
 
-    students: list[StudentAsked] = Field(min_length=1, max_length=MAX_PEOPLE)
+    students: list[StudentBody] = Field(min_length=1, max_length=MAX_PEOPLE)
 
 
 class EnrolledShape(Shape):
@@ -128,13 +128,13 @@ class PolicyShape(Shape):
     )
 
 
-class PolicyAsked(PolicyShape):
+class PolicyBody(PolicyShape):
     """The new policy."""
 
     assignment: str = Field("", max_length=100)
 
 
-class ExtensionAsked(BaseModel):
+class ExtensionBody(BaseModel):
     """An extension for one student, which replaces an earlier one."""
 
     assignment: str = Field("", max_length=100, description="Empty for all assignments.")
@@ -166,11 +166,11 @@ def list_people(access: ReadAccess, context: Context, limit: Limit = 50, after: 
 
 
 @router.post("/courses/{course_id}/people", status_code=201)
-def enrol(access: ManageAccess, context: Context, asked: EnrolAsked) -> EnrolledShape:
+def enrol(access: ManageAccess, context: Context, body: EnrolBody) -> EnrolledShape:
     """Enrol students. The names and e-mail addresses of enrolled students are updated."""
-    students = [Student(each.id, each.name, each.email) for each in asked.students]
+    students = [Student(each.id, each.name, each.email) for each in body.students]
     people.enrol(context.service, access.actor, access.course_id, students)
-    return EnrolledShape(students=len(asked.students))
+    return EnrolledShape(students=len(body.students))
 
 
 @router.get("/courses/{course_id}/people/{enrolment_id}")
@@ -196,9 +196,9 @@ def limits(
 
 
 @router.post("/courses/{course_id}/people/{enrolment_id}/extensions", status_code=201)
-def extend(access: ManageAccess, context: Context, enrolment_id: RowNumber, asked: ExtensionAsked) -> LimitsShape:
+def extend(access: ManageAccess, context: Context, enrolment_id: RowNumber, body: ExtensionBody) -> LimitsShape:
     """Allow one student more time or attempts."""
-    request = ExtensionRequest(asked.assignment, asked.due_at, asked.more_attempts)
+    request = ExtensionRequest(body.assignment, body.due_at, body.more_attempts)
     policy_limits = policies.extend(context.service, access.actor, access.course_id, enrolment_id, request)
     return LimitsShape.model_validate(policy_limits)
 
@@ -217,11 +217,11 @@ def list_policies(access: ReadAccess, context: Context, limit: Limit = 50, after
 
 
 @router.put("/courses/{course_id}/policies")
-def set_policy(access: ManageAccess, context: Context, asked: PolicyAsked) -> PolicyShape:
+def set_policy(access: ManageAccess, context: Context, body: PolicyBody) -> PolicyShape:
     """Set the policy of an assignment. Without an assignment, set the course's default policy."""
-    policy_limits = PolicyLimits(asked.due_at, asked.late_days, asked.attempts, asked.cool_down_seconds)
-    policies.set_policy(context.service, access.actor, access.course_id, asked.assignment, policy_limits)
-    return _to_policy_shape(asked.assignment, policy_limits)
+    policy_limits = PolicyLimits(body.due_at, body.late_days, body.attempts, body.cool_down_seconds)
+    policies.set_policy(context.service, access.actor, access.course_id, body.assignment, policy_limits)
+    return _to_policy_shape(body.assignment, policy_limits)
 
 
 @router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)

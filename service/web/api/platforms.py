@@ -55,7 +55,7 @@ class PlatformShape(Shape):
     model_config = build_example_config(id=1, **_MOODLE_EXAMPLE, service_origins=[])
 
 
-class PlatformAsked(BaseModel):
+class PlatformBody(BaseModel):
     """A learning platform to register. It replaces a registration with the same issuer and client ID."""
 
     name: str = Field(min_length=1, max_length=200, examples=[_MOODLE_EXAMPLE["name"]])
@@ -92,7 +92,7 @@ class EnrolledMembersShape(Shape):
     model_config = build_example_config(members=20, refused=[])
 
 
-class MarksOfAsked(BaseModel):
+class PassBackBody(BaseModel):
     """The assignment whose published marks are sent."""
 
     assignment: str = Field(min_length=1, max_length=200, examples=["shape-recognition"])
@@ -114,10 +114,10 @@ def list_platforms(operator: OperatorReadAccess, context: Context) -> Listed[Pla
 
 
 @router.post("/operator/platforms", status_code=201)
-def register(operator: OperatorManageAccess, context: Context, asked: PlatformAsked) -> Listed[PlatformShape]:
+def register(operator: OperatorManageAccess, context: Context, body: PlatformBody) -> Listed[PlatformShape]:
     """Register a platform, or update the one with the same issuer and client ID. Returns all registered platforms."""
-    tuples = {"deployments": tuple(asked.deployments), "service_origins": tuple(asked.service_origins)}
-    request = Registration(**(asked.model_dump() | tuples))
+    tuples = {"deployments": tuple(body.deployments), "service_origins": tuple(body.service_origins)}
+    request = Registration(**(body.model_dump() | tuples))
     lines = platforms.register(context.service, operator.actor, request)
     return Listed(items=[PlatformShape.model_validate(each) for each in lines])
 
@@ -140,6 +140,6 @@ def enrol_members(access: ManageAccess, context: Context) -> EnrolledMembersShap
 
 
 @router.post("/courses/{course_id}/platform/marks", responses=_PLATFORM_ERRORS)
-def pass_back(access: ManageAccess, context: Context, asked: MarksOfAsked) -> SentShape:
+def pass_back(access: ManageAccess, context: Context, body: PassBackBody) -> SentShape:
     """Send the published marks of an assignment to the platform's gradebook."""
-    return SentShape(sent=platforms.pass_back(context.service, access.actor, access.course_id, asked.assignment))
+    return SentShape(sent=platforms.pass_back(context.service, access.actor, access.course_id, body.assignment))

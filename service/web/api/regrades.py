@@ -36,7 +36,7 @@ FormatName = Annotated[
 PublishedOnly = Annotated[bool, Query(description="Export only published grades.")]
 
 
-class RegradeAsked(BaseModel):
+class RegradeBody(BaseModel):
     """Options for grading a batch again."""
 
     assignment: str = Field(
@@ -107,7 +107,7 @@ class ChangeShape(Shape):
     )
 
 
-class PublishAsked(BaseModel):
+class PublishBody(BaseModel):
     """Options for publishing grades."""
 
     anyway: bool = Field(
@@ -129,11 +129,9 @@ class PublishedShape(Shape):
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
-def regrade(
-    access: MarkAccess, context: Context, batch_id: RowName, asked: RegradeAsked | None = None
-) -> RegradedShape:
+def regrade(access: MarkAccess, context: Context, batch_id: RowName, body: RegradeBody | None = None) -> RegradedShape:
     """Grade a batch again. The old grades apply until you publish the new ones."""
-    name = "" if asked is None else asked.assignment
+    name = "" if body is None else body.assignment
     regrade_batch = operations.regrade_batch(context.service, access.actor, access.course_id, batch_id, name)
     return RegradedShape.model_validate(regrade_batch)
 
@@ -152,11 +150,9 @@ def changes(
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
-def publish(
-    access: MarkAccess, context: Context, batch_id: RowName, asked: PublishAsked | None = None
-) -> PublishedShape:
+def publish(access: MarkAccess, context: Context, batch_id: RowName, body: PublishBody | None = None) -> PublishedShape:
     """Publish the newest grades of a batch. They become the current grades, and students can see them."""
-    includes_unjudged = asked is not None and asked.anyway
+    includes_unjudged = body is not None and body.anyway
     publication_counts = operations.publish(
         context.service, access.actor, access.course_id, batch_id, includes_unjudged=includes_unjudged
     )
@@ -165,10 +161,10 @@ def publish(
 
 @router.post("/courses/{course_id}/grades/{job_id}/publish")
 def publish_one(
-    access: MarkAccess, context: Context, job_id: RowName, asked: PublishAsked | None = None
+    access: MarkAccess, context: Context, job_id: RowName, body: PublishBody | None = None
 ) -> PublishedShape:
     """Publish the newest grade of a submission. It becomes the current grade, and the student can see it."""
-    includes_unjudged = asked is not None and asked.anyway
+    includes_unjudged = body is not None and body.anyway
     publication_counts = operations.publish_one(
         context.service, access.actor, access.course_id, job_id, includes_unjudged=includes_unjudged
     )
@@ -177,10 +173,10 @@ def publish_one(
 
 @router.post("/courses/{course_id}/grades/{job_id}/regrades", status_code=201)
 def regrade_one(
-    access: MarkAccess, context: Context, job_id: RowName, asked: RegradeAsked | None = None
+    access: MarkAccess, context: Context, job_id: RowName, body: RegradeBody | None = None
 ) -> RegradedOneShape:
     """Grade a submission again. The old grade applies until you publish the new one."""
-    name = "" if asked is None else asked.assignment
+    name = "" if body is None else body.assignment
     return RegradedOneShape(job=operations.regrade_one(context.service, access.actor, access.course_id, job_id, name))
 
 

@@ -31,7 +31,7 @@ class LinkShape(Shape):
     model_config = build_example_config(path="/sign-in/rml_...", url="https://robomark.example.org/sign-in/rml_...")
 
 
-class LinksAsked(BaseModel):
+class LinksBody(BaseModel):
     """Validity of the links of a course, in days."""
 
     days: int = Field(sign_in_links.DAYS, ge=1, le=sign_in_links.MAX_DAYS)
@@ -72,9 +72,9 @@ class StudentLinksShape(Shape):
 
 
 @router.post("/courses/{course_id}/people/links", status_code=201, openapi_extra=dict(NO_KEY))
-def links(access: ManageAccess, context: Context, asked: LinksAsked | None = None) -> StudentLinksShape:
+def links(access: ManageAccess, context: Context, body: LinksBody | None = None) -> StudentLinksShape:
     """Create sign-in links for the students of the course, by ID. Earlier links become invalid."""
-    days = sign_in_links.DAYS if asked is None else asked.days
+    days = sign_in_links.DAYS if body is None else body.days
     student_links = sign_in_links.make_links(context.service, access.actor, access.course_id, days)
     return StudentLinksShape(links=[_to_student_link_shape(context, each) for each in student_links])
 

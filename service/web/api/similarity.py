@@ -30,7 +30,7 @@ class StretchShape(Shape):
     other_lines: tuple[int, int]
 
 
-class AlikeSourcesShape(Shape):
+class SimilarSourcesShape(Shape):
     """Two similar sources."""
 
     files: tuple[str, str]
@@ -62,7 +62,7 @@ class SimilarPairShape(Shape):
 
     students: tuple[str, str]
     share: float = Field(description="Largest fraction of a source that is also in the other source, from 0 to 1.")
-    sources: list[AlikeSourcesShape]
+    sources: list[SimilarSourcesShape]
     trials: list[SameInTrialShape]
 
 

@@ -29,7 +29,7 @@ SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "sub
 PREFIX = "/courses/{course_id}/mine/tryouts"
 
 
-class TryoutShape(Shape):
+class TestRunShape(Shape):
     """A test run of a program."""
 
     id: str
@@ -61,19 +61,19 @@ def ask(
     context: Context,
     uploaded_files: SentFiles,
     assignment: Annotated[str, Query(min_length=1, max_length=100, examples=["shape-recognition"])],
-) -> TryoutShape:
+) -> TestRunShape:
     """Start a test run at the first pose of the first visible scenario.
 
     A test run has no marks and does not count as an attempt.
     """
     test_run_id = start_test_run(context, access.actor, access.course_id, assignment, uploaded_files)
-    return _to_tryout_shape(test_runs.show(context.service, access.actor, access.course_id, test_run_id))
+    return _to_test_run_shape(test_runs.show(context.service, access.actor, access.course_id, test_run_id))
 
 
 @router.get(PREFIX + "/{tryout_id}")
-def one_tryout(access: ReadAccess, context: Context, tryout_id: RowName) -> TryoutShape:
+def one_test_run(access: ReadAccess, context: Context, tryout_id: RowName) -> TestRunShape:
     """Return the state and the result of a test run. Test runs are deleted after a day."""
-    return _to_tryout_shape(test_runs.show(context.service, access.actor, access.course_id, tryout_id))
+    return _to_test_run_shape(test_runs.show(context.service, access.actor, access.course_id, tryout_id))
 
 
 @router.get(PREFIX + "/{tryout_id}/replay", responses=REPLAY_RESPONSES, response_class=Response)
@@ -83,8 +83,8 @@ def replay(request: Request, access: ReadAccess, context: Context, tryout_id: Ro
     return respond_with_etag(request, zlib.decompress(compressed), "application/json")
 
 
-def _to_tryout_shape(line: StudentTestRun) -> TryoutShape:
-    return TryoutShape(
+def _to_test_run_shape(line: StudentTestRun) -> TestRunShape:
+    return TestRunShape(
         id=line.id,
         assignment=line.assignment,
         state=line.state,

@@ -52,7 +52,7 @@ class NewWebhookShape(WebhookShape):
     )
 
 
-class WebhookAsked(BaseModel):
+class WebhookBody(BaseModel):
     """The address and events of a new webhook."""
 
     url: str = Field(max_length=webhooks.MAX_URL_LENGTH, examples=["https://hooks.example.org/robomark"])
@@ -93,9 +93,9 @@ def list_webhooks(access: ManageAccess, context: Context) -> Listed[WebhookShape
 
 
 @router.post("/courses/{course_id}/webhooks", status_code=201, openapi_extra=dict(NO_KEY))
-def create(access: ManageAccess, context: Context, asked: WebhookAsked) -> NewWebhookShape:
+def create(access: ManageAccess, context: Context, body: WebhookBody) -> NewWebhookShape:
     """Create a webhook. Its secret is returned only once, so this route ignores idempotency keys."""
-    line, secret = webhooks.create(context.service, access.actor, access.course_id, asked.url, asked.events)
+    line, secret = webhooks.create(context.service, access.actor, access.course_id, body.url, body.events)
     return NewWebhookShape(**WebhookShape.model_validate(line).model_dump(), secret=secret)
 
 

@@ -36,7 +36,7 @@ def show_appeals(
         request,
         access.reader,
         "appeals.html",
-        here=access,
+        access=access,
         open=open_appeals[:_PAGE_SIZE],
         answered=answered_appeals[:_PAGE_SIZE],
         more=open_appeals[_PAGE_SIZE - 1].id if len(open_appeals) > _PAGE_SIZE else None,
@@ -68,7 +68,9 @@ def answer_appeal(access: CourseInstructor, context: Context, appeal_id: RowNumb
 def show_own_appeals(request: Request, access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Show a student's appeals about a submission, the answers, and the form if they may appeal."""
     own_appeals = appeals.show_own(context.service, access.actor, access.course_id, submission_id)
-    return render_page(request, access.reader, "appeal.html", here=access, found=own_appeals, longest=MAX_TEXT_LENGTH)
+    return render_page(
+        request, access.reader, "appeal.html", access=access, own_appeals=own_appeals, longest=MAX_TEXT_LENGTH
+    )
 
 
 @router.post("/mine/submissions/{submission_id}/appeal")

@@ -92,8 +92,8 @@ def show_submissions(
         "batch_table.html",
         **page_context,
         table=table,
-        asked=table_request,
-        remarked=review_counts,
+        table_request=table_request,
+        review_counts=review_counts,
         columns=_choose_columns(view.lines),
         verdicts={each.value: describe_verdict(each, detect_language(request)).short for each in Verdict},
         entry=next((each for each in view.history if each.action == done in _ACTIONS), None),
@@ -111,7 +111,7 @@ def show_progress(request: Request, access: CourseInstructor, context: Context, 
         access, views.show_progress(context.service, access.actor, access.course_id, batch_id)
     )
     answer = render_page(request, access.reader, "batch_progress.html", **progress_context)
-    if not progress_context["goes_on"]:
+    if not progress_context["is_unfinished"]:
         answer.headers["hx-refresh"] = "true"
     return answer
 
@@ -140,7 +140,7 @@ def show_overview(
         at_least=at_least,
         by_id={line.id: line for line in lines if line.id},
         job_of={(line.assignment, line.student): line.id for line in lines if line.id},
-        refused=[line for line in lines if not line.id],
+        rejected_lines=[line for line in lines if not line.id],
     )
 
 
@@ -156,7 +156,12 @@ def show_changes(
     _, page_context = _load_batch(access, context, batch_id)
     changes_page = views.show_changes_page(context.service, access.actor, access.course_id, batch_id, number)
     return render_page(
-        request, access.reader, "batch_changes.html", **page_context, found=changes_page, changes=changes_page.changes
+        request,
+        access.reader,
+        "batch_changes.html",
+        **page_context,
+        changes_page=changes_page,
+        changes=changes_page.changes,
     )
 
 
@@ -230,7 +235,7 @@ def _load_batch(access: ReaderInCourse, context: WebContext, batch_id: str) -> t
     return table_view, {
         "lines": table_view.lines,
         "assignments": sorted({each.assignment for each in table_view.lines if each.id}),
-        "nameless": table_view.has_hidden_names,
+        "has_hidden_names": table_view.has_hidden_names,
         "waiting_regrades": table_view.waiting_regrades,
         "history": table_view.history,
         "to_publish": sum(each.published_at is None for each in graded_lines),
@@ -247,12 +252,12 @@ def _count_states(line: BatchLine) -> dict[str, int]:
 def _build_progress_context(access: ReaderInCourse, view: BatchView) -> dict[str, Any]:
     line, progress = view.batch, view.progress
     return {
-        "here": access,
+        "access": access,
         "batch": line,
-        "far": progress,
+        "progress": progress,
         "share": round(100 * min(1.0, (progress.ended + progress.partial) / progress.jobs)) if progress.jobs else 100,
         "pace": view.pace,
-        "goes_on": progress.ended < progress.jobs,
+        "is_unfinished": progress.ended < progress.jobs,
         "path": f"/courses/{access.course_id}/batches/{line.id}",
         "counts": _count_states(line),
         "states": _STATES,

@@ -39,7 +39,7 @@ def show_similar_submissions(
         request,
         access.reader,
         "batch_similar.html",
-        here=access,
+        access=access,
         batch=compared_batch.batch,
         body=body,
         compared=submission_count,

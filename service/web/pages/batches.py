@@ -89,11 +89,11 @@ def show_upload(request: Request, access: CourseInstructor, context: Context, up
         request,
         access.reader,
         "upload.html",
-        here=access,
+        access=access,
         upload=pending_upload,
-        known=None,
+        known_jobs=None,
         missing=missing,
-        strangers=[each.student for each in pending_upload.expected if not each.enrolled],
+        new_students=[each.student for each in pending_upload.expected if not each.enrolled],
         known_before=sum(each.known for each in pending_upload.expected),
         copied=sum(each.copied for each in pending_upload.expected),
     )
@@ -114,7 +114,9 @@ def confirm(
     PendingUploads(context.settings.home).remove(pending_upload)
     if submitted_batch.batch is None:
         known_jobs = sorted((each.student, each.job_id) for each in submitted_batch.known)
-        return render_page(request, access.reader, "upload.html", here=access, upload=pending_upload, known=known_jobs)
+        return render_page(
+            request, access.reader, "upload.html", access=access, upload=pending_upload, known_jobs=known_jobs
+        )
     return RedirectResponse(f"/courses/{access.course_id}/batches/{submitted_batch.batch.id}?done=submit", 303)
 
 
@@ -141,13 +143,13 @@ def _render_list(
         access.reader,
         "batches.html",
         status_code=status_code,
-        here=access,
+        access=access,
         batches=page.batches,
         older=page.older,
         unfinished=any(line.unfinished for line in page.batches),
         prepared=page.prepared,
         catalogue=[each for each in list_catalogue_ids() if each not in prepared_ids],
-        refused=rejection,
+        rejection=rejection,
         waiting=PendingUploads(context.settings.home).list_waiting(access.reader.identity.person_id, access.course_id),
     )
 

@@ -35,8 +35,8 @@ def search_catalogue(
         request,
         access.reader,
         "catalogue.html",
-        here=access,
-        found=sorted(matching_overviews, key=lambda each: (each.topic == "", each.section, each.title)),
+        access=access,
+        overviews=sorted(matching_overviews, key=lambda each: (each.topic == "", each.section, each.title)),
         everything=len(overviews),
         topics={number: TOPICS[number] for number in sorted({each.topic for each in overviews if each.topic})},
         prepared={each.assignment for each in course_assignments},
@@ -54,5 +54,10 @@ def show_catalogue_entry(
     course_assignments = assignment_views.list_prepared(context.service, access.actor, access.course_id)
     is_in_course = catalogue_assignment.id in {each.assignment for each in course_assignments}
     return render_page(
-        request, access.reader, "catalogue_entry.html", here=access, found=catalogue_assignment, in_course=is_in_course
+        request,
+        access.reader,
+        "catalogue_entry.html",
+        access=access,
+        assignment=catalogue_assignment,
+        in_course=is_in_course,
     )

@@ -33,7 +33,7 @@ def show_grade(
         request,
         access.reader,
         "grade.html",
-        here=access,
+        access=access,
         line=view.line,
         path=f"/courses/{access.course_id}/grades/{job_id}",
         report=view.report,
@@ -41,10 +41,10 @@ def show_grade(
         gradings=view.gradings,
         attempts=view.attempts,
         history=newest_first,
-        beside=view.neighbours,
+        neighbours=view.neighbours,
         batch_id=view.batch_id,
-        put_aside=view.awaits_approval,
-        told=next((entry for entry in newest_first if entry.action == done == "publish"), None),
+        awaits_approval=view.awaits_approval,
+        publication=next((entry for entry in newest_first if entry.action == done == "publish"), None),
     )
 
 

@@ -48,7 +48,7 @@ def show_account(request: Request, reader: SignedInReader, context: Context, mad
         tokens=[each for each in lines if each.kind is CredentialKind.TOKEN],
         sessions=[each for each in lines if each.kind is CredentialKind.SESSION],
         scopes=list_offered_scopes(identity.roles.values(), operator=identity.operator, limit=identity.scopes),
-        made=secret,
+        new_token=secret,
         word=generate_word(),
     )
 

@@ -28,9 +28,9 @@ def show_marking(request: Request, access: CourseInstructor, context: Context, j
         request,
         access.reader,
         "marking.html",
-        here=access,
+        access=access,
         marking=marking,
-        beside=grade_views.show_neighbours(context.service, access.actor, access.course_id, job_id),
+        neighbours=grade_views.show_neighbours(context.service, access.actor, access.course_id, job_id),
         longest_reason=MAX_REASON_LENGTH,
         longest_comment=MAX_COMMENT_LENGTH,
     )

@@ -80,7 +80,7 @@ def list_courses(
     same_id_instructors = people.show(context.service, actor, added).elsewhere if added else ()
     template = "operator_courses.html"
     return render_page(
-        request, reader, template, courses=lines, made=created_link, added=added, elsewhere=same_id_instructors
+        request, reader, template, courses=lines, created_link=created_link, added=added, elsewhere=same_id_instructors
     )
 
 

@@ -56,7 +56,7 @@ class _Rejection:
 def list_own_assignments(request: Request, access: CourseStudent, context: Context) -> Response:
     """Show the open assignments and the student's submissions."""
     lines = own_views.list_assignments(context.service, access.actor, access.course_id)
-    return render_page(request, access.reader, "mine.html", here=access, lines=lines)
+    return render_page(request, access.reader, "own_assignments.html", access=access, lines=lines)
 
 
 @router.get("/courses/{course_id}/mine/{assignment}")
@@ -141,7 +141,7 @@ def _render_assignment(
         access.reader,
         "own_assignment.html",
         status_code=rejection.status if rejection else 200,
-        here=access,
+        access=access,
         sheet=task.sheet,
         description=join_wrapped_lines(task.sheet.description),
         attempts=task.attempts,
@@ -151,7 +151,7 @@ def _render_assignment(
         is_open=task.is_open,
         can_try=task.can_test_run,
         has_tried=task.has_test_run,
-        refused=rejection,
+        rejection=rejection,
     )
     page.headers.update(rejection.headers if rejection else {})
     return page

@@ -36,8 +36,8 @@ def show_own_submission(
             request,
             access.reader,
             "own_progress.html",
-            here=access,
-            found=progress_view.submission,
+            access=access,
+            submission=progress_view.submission,
             place=progress_view.place,
         )
     view = own_views.show_submission_report(*submission_key, detect_language(request))
@@ -45,8 +45,8 @@ def show_own_submission(
         request,
         access.reader,
         "own_submission.html",
-        here=access,
-        found=view.submission,
+        access=access,
+        submission=view.submission,
         place=view.place,
         attempts=view.attempts,
         counting=view.counting,

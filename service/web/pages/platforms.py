@@ -82,7 +82,7 @@ def _render_course_platform(
         request,
         access.reader,
         "course_platform.html",
-        here=access,
+        access=access,
         link=view.link,
         assignments=view.assignments,
         enrolled=enrolled_members,

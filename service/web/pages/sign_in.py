@@ -27,7 +27,7 @@ def show_sign_in(
     request: Request, reader: OptionalReader, target: Annotated[str, Query(alias="next")] = "/"
 ) -> Response:
     """Show the form for a sign-in link or a token."""
-    return render_page(request, reader, "sign_in.html", target=sanitize_target(target), refused="")
+    return render_page(request, reader, "sign_in.html", target=sanitize_target(target), rejection="")
 
 
 @router.get("/sign-in/{link}")
@@ -41,7 +41,7 @@ def show_link(request: Request, reader: OptionalReader, context: Context, link: 
         # Count only failures: a valid link always works, even after many failures from the same address.
         context.limits.failed_sign_ins.spend(_find_client_address(request))
         message = _INVALID_LINK if reader is None else _INVALID_LINK_SIGNED_IN
-        return render_page(request, reader, "sign_in.html", status_code=410, target="/", refused=message)
+        return render_page(request, reader, "sign_in.html", status_code=410, target="/", rejection=message)
     return render_page(request, reader, "sign_in_link.html", link=link, name=owner.name)
 
 
@@ -60,7 +60,7 @@ def sign_in(
     if new_session is None:
         context.limits.failed_sign_ins.spend(_find_client_address(request))
         return render_page(
-            request, reader, "sign_in.html", status_code=403, target=sanitize_target(target), refused=_INVALID_LINK
+            request, reader, "sign_in.html", status_code=403, target=sanitize_target(target), rejection=_INVALID_LINK
         )
     answer = RedirectResponse(sanitize_target(target), 303)
     set_session_cookie(answer, context, new_session)

@@ -40,7 +40,7 @@ def show_newest_test_run(request: Request, access: CourseStudent, context: Conte
     line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
     if line is None or not line.waits:
         return Response(headers={"hx-refresh": "true"})
-    return render_page(request, access.reader, "tryout_progress.html", here=access, line=line)
+    return render_page(request, access.reader, "test_run_progress.html", access=access, line=line)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
@@ -80,14 +80,14 @@ def _render_test_run(
     page = render_page(
         request,
         access.reader,
-        "tryout.html",
+        "test_run.html",
         status_code=status,
-        here=access,
+        access=access,
         sheet=view.sheet,
         seconds=view.seconds,
         line=view.line,
         replay=render_replay_section(view.replay, detect_language(request)) if view.replay else None,
-        refused=message,
+        rejection=message,
         texts=list(typed_texts) or (_read_texts(view.sheet, view.submission) if view.submission else []),
     )
     page.headers.update(headers or {})

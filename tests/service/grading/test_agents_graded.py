@@ -230,5 +230,5 @@ def test_avoided_modules_are_avoided_by_agents_too() -> None:
 def test_a_submission_without_an_agent_is_refused(tmp_path: Path) -> None:
     files = {name: data for name, data in REFERENCE.files.items() if name != "logger.py"}
     lacking = Submission("ada", responder=SourceFile("responder.py", "x = 1"), files=MappingProxyType(files))
-    with pytest.raises(UsageError, match=r"no agent logger; parser-agent-and-logger asks for logger\.py"):
+    with pytest.raises(UsageError, match=r"no agent logger; parser-agent-and-logger requires logger\.py"):
         plan_run(lacking, ASSIGNMENT)

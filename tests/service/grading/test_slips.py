@@ -49,9 +49,9 @@ def test_there_is_no_slip_in_programs_that_are_right() -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("area = side ^ 2", "Write ** in place of ^"),
-        ("if 10 < x & x < 20:", "Write and in place of &"),
-        ("if x < 10 | y > 20:", "Write or in place of |"),
+        ("area = side ^ 2", "Write ** instead of ^"),
+        ("if 10 < x & x < 20:", "Write and instead of &"),
+        ("if x < 10 | y > 20:", "Write or instead of |"),
         ('while colour != "red" and "white":', 'Write and colour != "white"'),
         ("if colour == 3 or 5:", "Write or colour == 5"),
         ("light = colorLeft.red\nif light and other < 25:", "Write light < 25 and other < 25"),

@@ -213,9 +213,10 @@ def test_worst_trial_is_the_one_that_lost_most() -> None:
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_every_verdict_has_words(verdict: Verdict) -> None:
     words = describe_verdict(verdict)
-    assert all((words.short, words.happened, words.whose, words.next_step))
-    ours = verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
-    assert ("not your fault" in words.whose) is ours
+    assert all((words.short, words.happened, words.next_step))
+    assert bool(words.explanation) is (verdict is not Verdict.FINISHED)
+    is_ours = verdict in (Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
+    assert ("not your fault" in words.explanation) is is_ours
 
 
 def test_marks_are_not_rounded_on_the_way() -> None:

@@ -1,11 +1,11 @@
 def tosses_until(tosses, wanted):
-    """How many tosses it took until the wanted side came; 0 if it never came."""
+    """Return the number of tosses until the first ``wanted`` side; 0 if it never appears."""
     count = 0
     # TODO: a while loop over the tosses.
     return count
 
 
 def longest_run(tosses):
-    """How often the same side came in a row at the most."""
+    """Return the length of the longest run of equal tosses."""
     # TODO
     return 0

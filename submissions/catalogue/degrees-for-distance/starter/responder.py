@@ -2,12 +2,12 @@ import math
 
 
 def degrees_for(distance, diameter=5.6):
-    """Degrees that a wheel turns to roll so far; both in centimetres."""
+    """Return the degrees that a wheel turns to roll this distance. Distance and diameter are in centimetres."""
     # TODO
     return 0
 
 
 def distance_for(degrees, diameter=5.6):
-    """How far a wheel rolls, in centimetres, when it turns so many degrees."""
+    """Return the distance that a wheel rolls, in centimetres, when it turns by this number of degrees."""
     # TODO
     return 0

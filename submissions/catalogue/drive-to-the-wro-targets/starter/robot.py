@@ -6,7 +6,7 @@ MM_PER_DEGREE = 0.4887  # of the left wheel
 
 
 def forwards(mm):
-    """Drive straight on by so many mm, watching the left wheel's position."""
+    """Drive straight ahead by this distance in mm, measured by the left wheel's position."""
     start = int(tank_drive.left_motor.position)
     tank_drive.on(SpeedPercent(40), SpeedPercent(40))
     while (int(tank_drive.left_motor.position) - start) * MM_PER_DEGREE < mm:

@@ -1,3 +1,3 @@
 def responder(message):
-    """Called with every message of the robot's; what it returns is the answer."""
+    """Return the answer to a message of the robot."""
     return "I saw " + message

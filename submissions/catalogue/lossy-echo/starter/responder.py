@@ -1,3 +1,3 @@
 def responder(message):
-    """Called with every message of the robot's that arrives; what it returns is the answer."""
+    """Return the answer to a message of the robot. Lost messages do not arrive here."""
     return "I saw " + message

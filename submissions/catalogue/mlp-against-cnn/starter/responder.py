@@ -8,5 +8,5 @@ cnn = load_onnx("cnn_digits_14x14.onnx")
 
 
 def responder(text):
-    """Answer a text that begins with IMG_DATA:: and goes on with {"left": "...", "right": "..."}."""
+    """Answer a text IMG_DATA::{"left": "...", "right": "..."}."""
     return "JSON::" + json.dumps({"message": {"mlp": "0", "cnn": "0"}})

@@ -1,3 +1,3 @@
 def agent(text):
-    """Called with the robot's text; parser(...) asks the parser."""
+    """Return the answer to a text of the robot; parser(...) calls the parser."""
     return parser(text)

@@ -1,3 +1,3 @@
 def logger(text, response):
-    """Called with the robot's text and the responder's answer."""
+    """Log a text of the robot and the answer of the responder."""
     return 0

@@ -1,3 +1,3 @@
 def parser(text):
-    """Called with the robot's text; what it returns goes back to whoever asked."""
+    """Return the answer to a text; the caller receives it."""
     return text

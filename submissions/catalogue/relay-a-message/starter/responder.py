@@ -1,3 +1,3 @@
 def responder(text):
-    """Called with every message of either robot's; what it returns goes to that robot. sender is its number."""
+    """Return the answer to a message of a robot. sender is the number of the robot."""
     return "robot " + str(sender) + " said " + text

@@ -2,6 +2,6 @@ import json
 
 
 def responder(message):
-    """Tell the robot what to do."""
+    """Send commands to the robot."""
     # TODO: what do the sensors read, and which rule applies?
     return "JSON::" + json.dumps({"message": {"do": "wait"}})

@@ -2,5 +2,5 @@ import json
 
 
 def responder(text):
-    """Answer a text that begins with IMG_DATA:: and goes on with {"left": "...", "right": "..."}."""
+    """Answer a text IMG_DATA::{"left": "...", "right": "..."}."""
     return "JSON::" + json.dumps({"message": {"shape": "square"}})

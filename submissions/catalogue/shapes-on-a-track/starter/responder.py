@@ -5,7 +5,7 @@ from sklearn.neural_network import MLPClassifier
 
 
 def shape_of(pixels):
-    """The shape in an image of collected_shapes.csv, given as a text of 196 digits."""
+    """Return the shape in an image of collected_shapes.csv, given as a text of 196 digits."""
     # TODO: train a network on the images of the file, and ask it.
     return "square"
 

@@ -1,5 +1,5 @@
 def working_days(days):
-    """The days but for Saturday and Sunday, in a new list."""
+    """Return a new list of the days without Saturday and Sunday."""
     found = []
     for day in days:
         # TODO: skip the weekend with continue.
@@ -8,7 +8,7 @@ def working_days(days):
 
 
 def days_before(days, last):
-    """The days before the day last, in a new list; all of them if it is not there."""
+    """Return a new list of the days before the day last; all days if last is not among them."""
     found = []
     for day in days:
         # TODO: leave the loop with break.

@@ -8,7 +8,7 @@ import pytest
 
 import responders.trial_spec
 from responders.function_calls import FunctionCall
-from responders.libraries_needed import build_notebook_source, may_need_libraries
+from responders.required_libraries import build_notebook_source, may_need_libraries
 from responders.sandbox.inside.libraries import STANDARD_MODULES
 from responders.sandbox.roles import ChildRole
 from responders.sandbox.running_child import ChildLimits
