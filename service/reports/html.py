@@ -276,7 +276,7 @@ def _create_environment(language: Language) -> Environment:
         lstrip_blocks=True,
     )
     # A translated sentence with its parameters is ordinary text: filtered and escaped as a whole.
-    environment.globals["_"] = language.say
+    environment.globals.update({"_": language.say, "counted": language.counted})
     return environment
 
 

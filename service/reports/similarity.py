@@ -61,7 +61,11 @@ def describe_similarity(similarity: Similarity, language: Language = ENGLISH) ->
             tokens=MIN_TOKENS,
         )
     if similarity.not_compared:
-        sentence += "; " + language.say("%(count)s less similar pairs were not compared", count=similarity.not_compared)
+        sentence += "; " + language.counted(
+            "%(count)s less similar pair was not compared",
+            "%(count)s less similar pairs were not compared",
+            similarity.not_compared,
+        )
     return sentence
 
 

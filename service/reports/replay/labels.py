@@ -38,7 +38,7 @@ _SENTENCES: Mapping[str, str] = MappingProxyType(
         "lostAt": translatable("lost at"),
         "moment": translatable("Moment"),
         "moreLines": translatable("… %(count)s more lines"),
-        "moreRows": translatable("%(count)s more are not shown."),
+        "moreRows": translatable("Not shown: %(count)s more."),
         "named": translatable("Sent at %(seconds)s: %(truth)s, identified correctly."),
         "near": translatable("Near the robot"),
         "neverArrived": translatable("%(befell)s: never arrived"),

@@ -127,7 +127,7 @@ def test_everything_that_is_said_is_in_the_catalogues(foreign: Foreign) -> None:
 def test_a_german_report_is_german() -> None:
     page = page_of(build_student_view(shape_grade(), language=GERMAN))
     assert '<html lang="de">' in page
-    for words in ("Punkten</span>", "<h2>Wiedergabe</h2>", "wurde als", "Die meisten Punkte sind", "Alle Läufe"):
+    for words in ("Punkten</span>", "<h2>Wiedergabe</h2>", "wurde als", "Die meisten Punkte gibt es", "Alle Läufe"):
         assert words in page
     assert island_of(page)["words"]["sentences"]["play"] == "Abspielen"
     assert data_of(page)["trials"][0]["ended"] == "abgeschlossen"

@@ -167,18 +167,18 @@ def test_a_refusal_keeps_what_was_typed_as_it_was(web: Web, ada: Member, path: s
 @pytest.mark.parametrize(
     ("files", "texts", "german"),
     [
-        ([], [], "Es wurden keine Dateien abgegeben; wählen Sie eine Datei aus, oder fügen Sie ein Programm ein."),
-        ([("essay.pdf", b"%PDF")], [], "hat kein robot.py oder responder.py (gefunden: essay.pdf)"),
-        ([("robot.py", b"x" * (17 << 20))], [], "ist zu groß, erwartet waren höchstens 16 MB je Datei"),
+        ([], [], "Es wurden keine Dateien abgegeben; wählen Sie eine Datei aus oder fügen Sie ein Programm ein."),
+        ([("essay.pdf", b"%PDF")], [], "enthält weder robot.py noch responder.py (gefunden: essay.pdf)"),
+        ([("robot.py", b"x" * (17 << 20))], [], "ist zu groß, erlaubt sind höchstens 16 MB je Datei"),
         (
             [("robot.py", b" \n"), ("responder.py", RESPONDER.encode())],
             [],
-            "robot.py ist leer, erwartet war ein Programm.",
+            "robot.py ist leer, erwartet wird ein Programm.",
         ),
         ([("robot.py", b"\x00"), ("responder.py", RESPONDER.encode())], [], "hat ein NUL-Zeichen in Zeile 1"),
-        ([("all.zip", b"PK\x03\x04 torn")], [], "ist kein lesbares Zip-Archiv"),
-        ([("robot.py", PROGRAM.encode())], [PROGRAM], "robot.py wurde als Datei ausgewählt und auch eingegeben"),
-        ([("robot.py", PROGRAM.encode())], [], "Es gibt kein responder.py; fügen Sie es hinzu"),
+        ([("all.zip", b"PK\x03\x04 torn")], [], "ist kein lesbares ZIP-Archiv"),
+        ([("robot.py", PROGRAM.encode())], [PROGRAM], "robot.py wurde sowohl als Datei ausgewählt als auch eingegeben"),
+        ([("robot.py", PROGRAM.encode())], [], "responder.py fehlt; fügen Sie die Datei hinzu"),
     ],
 )
 def test_a_german_page_refuses_in_german(
