@@ -34,6 +34,7 @@ from service.grading.standalone_runs import (
     run_program,
 )
 from service.grading.trial_runner import TrialRunner
+from service.grading.verdict_labels import VERDICT_LABELS
 from service.home import user_permissions
 from service.reports.display_text import to_display_text
 from service.reports.output_files import prepare_folder, write_file, write_film, write_replay
@@ -205,12 +206,15 @@ def _show_recording(recording: Recording) -> None:
         end, owner = robot_recording.end, "" if robot_recording is recording else f"{robot}: "
         print_line(
             f"{robot_recording.end_t:8.2f} s  {owner}end at x {end.x:.1f} mm, y {end.y:.1f} mm, heading "
-            f"{end.heading:.1f} degrees; {robot_recording.verdict}"
+            f"{end.heading:.1f} degrees; {VERDICT_LABELS[robot_recording.verdict]}"
         )
     for fault in collect_faults(recording):
         owner = "" if fault.file else f" of the {fault.who}"
         location = f" ({fault.place}{owner})" if fault.line is not None else ""
-        print(f"{fault.t:8.2f} s  {fault.verdict}: {to_display_text(fault.message, 400)}{location}", file=sys.stderr)
+        print(
+            f"{fault.t:8.2f} s  {VERDICT_LABELS[fault.verdict]}: {to_display_text(fault.message, 400)}{location}",
+            file=sys.stderr,
+        )
         if fault.hint:
             print(f"            {fault.hint}", file=sys.stderr)
     for note in recording.notes:
@@ -251,7 +255,7 @@ def _show_notebook(executed_notebook: ExecutedNotebook, show_run: Callable[[Reco
         print_note(f"note: {to_display_text(note, 400)}")
     if executed_notebook.stopped is not None:
         stopped = executed_notebook.stopped
-        print(f"{stopped.place}: {stopped.verdict}: {stopped.message}", file=sys.stderr)
+        print(f"{stopped.place}: {VERDICT_LABELS[stopped.verdict]}: {stopped.message}", file=sys.stderr)
     if not executed_notebook.runs:
         print_note("note: no robot was started: no cell begins with %%sim_magic_preloaded")
 

@@ -30,8 +30,11 @@ _STYLES: Mapping[JobState, str] = MappingProxyType(
 def build_marks_table(lines: Sequence[JobLine], refusals: Sequence[RejectedSubmission] = ()) -> Table:
     """Return a table with one row for each submission, including rejected ones.
 
-    The columns are marks, accuracy, verdict and remarks.
+    The columns are marks, accuracy, verdict (in the words of reports) and remarks.
     """
+    from service.grading.verdict_labels import VERDICT_LABELS
+    from sim.recording import Verdict
+
     has_names = any(line.name not in ("", line.student) for line in lines)
     headings = ("student", *(["name"] if has_names else []), "assignment", "marks", "accuracy", "verdict", "grade")
     table = create_table(*headings, right=("marks", "accuracy"))
@@ -41,7 +44,8 @@ def build_marks_table(lines: Sequence[JobLine], refusals: Sequence[RejectedSubmi
 
     for line in lines:
         accuracy = "" if line.accuracy is None else f"{line.accuracy:.2f}"
-        outcome = line.verdict or (f"{line.state.value}: {line.error}" if line.error else line.state.value)
+        state_text = f"{line.state.value}: {line.error}" if line.error else line.state.value
+        outcome = VERDICT_LABELS[Verdict(line.verdict)] if line.verdict else state_text
         table.add_row(
             *format_student(line.student, line.name, line.assignment),
             format_marks(line.marks, line.max_marks),

@@ -68,7 +68,7 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert ended.status == 2
     assert "1 submission was rejected" in ended.err
     assert re.search(r"^\[red\]odd\.txt +\S", ended.out, re.MULTILINE)
-    assert re.search(r"^reference +echo-responder +10 / 10 +finished +\w{12}$", ended.out, re.MULTILINE)
+    assert re.search(r"^reference +echo-responder +10 / 10 +completed +\w{12}$", ended.out, re.MULTILINE)
     odd = f"{build_file_stem('[red]odd.txt', 'refused')}.html"
     assert {path.name for path in reports.iterdir()} == {"flawed.html", "index.html", "reference.html", odd}
     assert "data:image/png;base64," in (reports / "reference.html").read_text()

@@ -67,8 +67,8 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
     assert found is not None, ended
     status = robomark(home, "batch", "status", found[1]).out
     for row in (
-        r"^Ada Lovelace .* 10 / 10 +finished",
-        r"^Alan Turing .* 6 / 10 +finished; no responder\.py",
+        r"^Ada Lovelace .* 10 / 10 +completed",
+        r"^Alan Turing .* 6 / 10 +completed; no responder\.py",
         r"^Zoë Ångström .* rejected: Zoë Ångström_500002_assignsubmission_file: has no robot\.py or responder\.py",
     ):
         assert re.search(row, status, re.MULTILINE), status

@@ -76,3 +76,13 @@ def test_axe_finds_nothing_when_all_is_open(
             "async () => (await axe.run()).violations.flatMap((each) => each.nodes.map((node) => [each.id, node.html]))"
         )
         assert wrong == []
+
+
+def test_closed_details_are_printed_open_and_without_a_marker(browser: Browser, tmp_path: Path) -> None:
+    with opened(browser, written("faulty", tmp_path), **DESKTOP) as found:
+        found.page.emulate_media(media="print")
+        closed = "document.querySelector('.details details:not([open])')"
+        assert found.page.evaluate(f"getComputedStyle({closed}.querySelector('summary')).listStyleType") == "none"
+        heights = f"[{closed}.offsetHeight, {closed}.querySelector('summary').offsetHeight]"
+        details_height, summary_height = found.page.evaluate(heights)
+        assert details_height > 1.5 * summary_height
