@@ -35,7 +35,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             r"unsupported operand type\(s\) .*'NoneType'|^(?:Type|Attribute)Error: 'NoneType' object",
             "A value is None: a function without return returns None.",
         ),
-        (r"^(?:IndentationError|TabError)", "Indent all lines of a block by the same number of spaces, without tabs."),
+        (r"^(?:IndentationError|TabError)", "Indent all lines of a block by the same number of blanks, without tabs."),
         (r"^SyntaxError: invalid character '[\u2018-\u201f]", "Type straight quotes, as they are on the keyboard."),
         (r"^SyntaxError: invalid character '[\u2010-\u2015\u2212]", "Type the minus sign of the keyboard: -"),
         (r"^SyntaxError: invalid non-printable character", "A blank was copied with the text. Delete it, and type it."),
@@ -48,7 +48,7 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"^SyntaxError: invalid syntax\n.*\bSpeedPercent\([^)]*$", "A closing bracket is missing."),
         (
             r"(?s)^IndexError.*pyState",
-            "The queue was still empty. Wait for an answer first, for example with time.sleep(1).",
+            "The queue was still empty: wait for an answer first, for example with time.sleep(1).",
         ),
         (r"^IndexError: list index out of range", "The list has no entry at this index. Check its length with len()."),
         (r"^TypeError: dump\(\)", "Did you mean json.dumps?"),

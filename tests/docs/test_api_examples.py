@@ -17,17 +17,17 @@ DOCUMENT = (ROOT / "docs" / "api.md").read_text()
 def test_every_request_shown_is_described(tmp_path: Path) -> None:
     with web_in(tmp_path) as web:
         paths = web.app.openapi()["paths"]
-    shown = [shlex.split(line) for line in re.findall(r"^\$ (curl .*)$", DOCUMENT, re.MULTILINE)]
-    assert len(shown) > 10
-    for words in shown:
+    examples = [shlex.split(line) for line in re.findall(r"^\$ (curl .*)$", DOCUMENT, re.MULTILINE)]
+    assert len(examples) > 10
+    for words in examples:
         (url,) = (word for word in words if word.startswith("$ROBOMARK/"))
         path, _, query = url.replace("$ROBOMARK", "/api/v1").partition("?")
         sends = {"-d", "--data-binary", "-F"} & set(words)
         method = words[words.index("-X") + 1].lower() if "-X" in words else "post" if sends else "get"
         fitting = [
-            found[method]
-            for template, found in paths.items()
-            if method in found and re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", template), path)
+            operations[method]
+            for template, operations in paths.items()
+            if method in operations and re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", template), path)
         ]
         assert fitting, (method, path)
         known = {each["name"] for each in fitting[0]["parameters"]} if query else set()

@@ -60,9 +60,9 @@ def test_every_command_is_one_with_these_options() -> None:
     for command in sorted({tuple(words) for words in _commands()}):
         assert command[0] == "robomark"
         # Options are all parsed before the help is shown.
-        shown = robomark(*command[1:], "--help")
-        assert shown.returncode == 0, (command, shown.stderr)
-        assert f"robomark {command[1]}" in shown.stdout
+        result = robomark(*command[1:], "--help")
+        assert result.returncode == 0, (command, result.stderr)
+        assert f"robomark {command[1]}" in result.stdout
 
 
 def test_everything_is_told_to_write_nowhere_else_and_to_gain_nothing() -> None:
@@ -138,5 +138,5 @@ def test_units_give_what_student_code_runs_in_nothing_that_breaks_its_sandbox() 
 
 
 def test_the_pages_name_every_file() -> None:
-    told = (ROOT / "docs" / "operators.md").read_text()
-    assert [file.name for file in FILES if f"deploy/{file.relative_to(DEPLOY)}" not in told] == []
+    document = (ROOT / "docs" / "operators.md").read_text()
+    assert [file.name for file in FILES if f"deploy/{file.relative_to(DEPLOY)}" not in document] == []

@@ -151,8 +151,8 @@ def test_every_kind_of_criterion_has_a_section_and_every_group_is_linked_for_ins
 
 
 def test_every_output_format_is_named_for_instructors() -> None:
-    told = (ROOT / "docs" / "instructors.md").read_text()
-    assert [name for name in FORMATS if f"`{name}`" not in told] == []
+    document_text = (ROOT / "docs" / "instructors.md").read_text()
+    assert [name for name in FORMATS if f"`{name}`" not in document_text] == []
 
 
 @pytest.mark.parametrize("kind", sorted(SCHEMAS))
@@ -191,8 +191,10 @@ def test_every_setting_of_a_criterion_is_explained(kind: str) -> None:
 
 
 def test_every_setting_is_in_the_table() -> None:
-    shown = set(re.findall(r"^\| `ROBOMARK_([A-Z_]+)` \|", (ROOT / "docs" / "operators.md").read_text(), re.MULTILINE))
-    assert shown == {each.name.upper() for each in fields(Settings)}
+    document_text = set(
+        re.findall(r"^\| `ROBOMARK_([A-Z_]+)` \|", (ROOT / "docs" / "operators.md").read_text(), re.MULTILINE)
+    )
+    assert document_text == {each.name.upper() for each in fields(Settings)}
 
 
 def test_links_between_documents_lead_somewhere() -> None:

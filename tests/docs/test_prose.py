@@ -44,23 +44,23 @@ def _docstrings(package: str) -> Iterator[str]:
                     yield re.sub(r"``[^`]*``", "X", text)
 
 
-def _found(texts: Sequence[str]) -> tuple[float, list[str]]:
+def _find_odd_phrases(texts: Sequence[str]) -> tuple[float, list[str]]:
     """Return the occurrences in 1000 words, and the phrases."""
     words = sum(len(text.split()) for text in texts)
-    found = [match[0] for text in texts for odd in _ODD.values() for match in re.finditer(odd, text, re.MULTILINE)]
-    return 1000 * len(found) / words, found
+    phrases = [match[0] for text in texts for odd in _ODD.values() for match in re.finditer(odd, text, re.MULTILINE)]
+    return 1000 * len(phrases) / words, phrases
 
 
 @pytest.mark.parametrize("document", _DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_document_is_in_plain_english(document: Path) -> None:
-    share, found = _found([_prose(document.read_text())])
-    assert share <= _MOST, found
+    share, phrases = _find_odd_phrases([_prose(document.read_text())])
+    assert share <= _MOST, phrases
 
 
 @pytest.mark.parametrize("package", _PACKAGES)
 def test_docstrings_are_in_plain_english(package: str) -> None:
-    share, found = _found(list(_docstrings(package)))
-    assert share <= _MOST, found[:40]
+    share, phrases = _find_odd_phrases(list(_docstrings(package)))
+    assert share <= _MOST, phrases[:40]
 
 
 @pytest.mark.parametrize(
@@ -68,4 +68,4 @@ def test_docstrings_are_in_plain_english(package: str) -> None:
     ["What cannot be read is refused.", "The worker goes on.", "A file of one's own.", "Nobody may read it."],
 )
 def test_such_a_phrase_is_found(text: str) -> None:
-    assert _found([f"Words before it. {text}"])[1]
+    assert _find_odd_phrases([f"Words before it. {text}"])[1]

@@ -119,7 +119,7 @@ def test_a_changelog_without_the_version_and_its_date_is_refused(text: str, reas
 
 def test_the_changelog_names_this_version_with_its_date() -> None:
     text, version = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), release.version_of(ROOT)
-    sections = [found["version"] for found in release._HEADING.finditer(text)]
+    sections = [each["version"] for each in release._HEADING.finditer(text)]
     if sections[0] != "Unreleased":
         release.check_changelog(text, version, datetime.now(UTC).date())
     assert version in sections[:2]

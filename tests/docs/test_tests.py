@@ -22,7 +22,7 @@ _WITH_IDS = sorted(file for file in (TESTS / "service").rglob("*.py") if file.pa
 @pytest.mark.parametrize("file", _WITH_IDS, ids=lambda file: file.stem)
 def test_no_random_id_can_break_a_test(file: Path) -> None:
     """Tests that a short text is absent must use ``naming.is_named``, which random ids cannot match by chance."""
-    found = [
+    violations = [
         f"{file.name}:{node.lineno}: {node.left.value!r} not in {ast.unparse(node.comparators[0])}"
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
         if isinstance(node, ast.Compare)
@@ -31,7 +31,7 @@ def test_no_random_id_can_break_a_test(file: Path) -> None:
         and isinstance(node.left.value, str)
         and _BY_CHANCE.fullmatch(node.left.value)
     ]
-    assert found == []
+    assert violations == []
 
 
 @pytest.mark.parametrize(

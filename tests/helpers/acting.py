@@ -93,8 +93,8 @@ def regrade_one(
 
 
 def export_file(store: Store, batch_id: str, form: str, *, published: bool, given: str | None = None) -> Download:
-    asked = ExportRequest(form, published, given)
-    return exports.download(service_on(store), machine(), _course(store, batch_id), batch_id, asked)
+    request = ExportRequest(form, published, given)
+    return exports.download(service_on(store), machine(), _course(store, batch_id), batch_id, request)
 
 
 def _course(store: Store, batch_id: str) -> int:

@@ -38,11 +38,11 @@ def contract_of(description: Mapping[str, Any]) -> Contract:
 
 def breaking_changes(before: Contract, now: Contract) -> list[str]:
     """Return the parts of contract ``before`` that a program can no longer rely on in contract ``now``."""
-    found = [f"{route} is gone" for route in before if route not in now]
+    changes = [f"{route} is gone" for route in before if route not in now]
     for route in before.keys() & now.keys():
-        found += [f"{route} {change}" for change in _stricter(before[route]["takes"], now[route]["takes"])]
-        found += [f"{route} {change}" for change in _looser(before[route]["gives"], now[route]["gives"])]
-    return sorted(found)
+        changes += [f"{route} {change}" for change in _stricter(before[route]["takes"], now[route]["takes"])]
+        changes += [f"{route} {change}" for change in _looser(before[route]["gives"], now[route]["gives"])]
+    return sorted(changes)
 
 
 def _stricter(before: Shape, now: Shape) -> Iterator[str]:

@@ -201,8 +201,8 @@ class Decoys:
 
     def harm(self) -> list[str]:
         """Return the changes since the decoys were made, as sentences."""
-        found = [f"{name} is now {after}" for name, after in self._look().items() if self._before[name] != after]
-        return found + [f"{server.getsockname()!r} was reached" for server in self._servers if _reached(server)]
+        damages = [f"{name} is now {after}" for name, after in self._look().items() if self._before[name] != after]
+        return damages + [f"{server.getsockname()!r} was reached" for server in self._servers if _reached(server)]
 
     def close(self) -> None:
         for server in self._servers:
@@ -227,9 +227,9 @@ class Decoys:
 def readable_tree(folder: Path) -> Path:
     """Create copies of our package folders with additional files, folders and links in them, and links beside them."""
     folder.chmod(0o755)
-    here = Path(manager.__file__).parents[2]
+    project_root = Path(manager.__file__).parents[2]
     for name in ("sim/brick", "responders/kit"):
-        shutil.copytree(here / name, folder / name)
+        shutil.copytree(project_root / name, folder / name)
         more = folder / name / "more"
         more.mkdir()
         for turn in range(len(_BITS)):
@@ -294,11 +294,11 @@ def scrambled(*secrets: str) -> list[str]:
 def run(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any]) -> str:
     """Run an attack in a new folder and return its result: ``LEAK ...``, or how it was blocked."""
     with sandboxes.open_private_folder() as folder:
-        said, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
-    leaks = [line for line in said if line.startswith("LEAK")]
+        output, stop = run_text(sandboxes, role, attack_text(attack, targets), folder)
+    leaks = [line for line in output if line.startswith("LEAK")]
     if leaks:
         return leaks[0]
-    return "\n".join(said) if stop is None else _describe_stop(stop)
+    return "\n".join(output) if stop is None else _describe_stop(stop)
 
 
 def _describe_stop(stop: ChildStopped | None) -> str:
@@ -314,15 +314,15 @@ def _describe_stop(stop: ChildStopped | None) -> str:
 
 def remembered(sandboxes: Sandboxes, role: ChildRole, attack: Attack, targets: dict[str, Any]) -> str:
     """Run a two-part attack and return its result: ``LEAK ...`` if the second half read all the bits of the first."""
-    found: list[int] = []
+    received_bits: list[int] = []
     for turn, bit in enumerate(_BITS):
-        told = _one_bit(sandboxes, role, attack, targets | {"since": time.time()}, turn, bit)
-        if not told.startswith("found "):
-            return told
-        found.append(int(told.removeprefix("found ")))
-    ones, zeros = ([value for value, bit in zip(found, _BITS, strict=True) if bit == which] for which in (1, 0))
+        answer = _one_bit(sandboxes, role, attack, targets | {"since": time.time()}, turn, bit)
+        if not answer.startswith("found "):
+            return answer
+        received_bits.append(int(answer.removeprefix("found ")))
+    ones, zeros = ([value for value, bit in zip(received_bits, _BITS, strict=True) if bit == which] for which in (1, 0))
     apart = min(ones) > max(zeros) or max(ones) < min(zeros)
-    return f"LEAK {found}" if apart else f"blocked {found}"
+    return f"LEAK {received_bits}" if apart else f"blocked {received_bits}"
 
 
 def _one_bit(
@@ -335,16 +335,16 @@ def _one_bit(
     with contextlib.ExitStack() as first:
         folder = first.enter_context(sandboxes.open_private_folder())
         child = first.enter_context(_running(sandboxes, role, _text(leave, attack, targets), folder))
-        said, stop = _heard(child, role, "ready ")
-        if any(line.startswith("blocked") for line in said) or (attack.at_once and not said):
-            return said[0] if said else f"blocked {stop}"
+        output, stop = _heard(child, role, "ready ")
+        if any(line.startswith("blocked") for line in output) or (attack.at_once and not output):
+            return output[0] if output else f"blocked {stop}"
         if attack.at_once:
-            targets = targets | {"other": int(said[-1].removeprefix("ready "))}
+            targets = targets | {"other": int(output[-1].removeprefix("ready "))}
         else:
             first.close()
         with sandboxes.open_private_folder() as folder:
-            said, stop = run_text(sandboxes, role, _text(find, attack, targets), folder)
-    return said[-1] if said else f"blocked {stop}"
+            output, stop = run_text(sandboxes, role, _text(find, attack, targets), folder)
+    return output[-1] if output else f"blocked {stop}"
 
 
 def run_text(sandboxes: Sandboxes, role: ChildRole, text: str, folder: Path) -> tuple[list[str], ChildStopped | None]:
@@ -373,22 +373,22 @@ def _running(sandboxes: Sandboxes, role: ChildRole, text: str, folder: Path) -> 
 
 def _heard(child: ServedChild, role: ChildRole, until: str | None = None) -> tuple[list[str], ChildStopped | None]:
     """Return the texts that a child prints, up to its end or to a text that begins with ``until``."""
-    said: list[str] = []
+    output: list[str] = []
     try:
         while True:
             frame = child.receive(SCHEMAS[role.removesuffix(" with libraries")])
             if frame["do"] == "print":
-                said.append(frame["text"])
+                output.append(frame["text"])
                 if until is not None and frame["text"].startswith(until):
-                    return said, None
+                    return output, None
             elif frame["do"] in ("end", "ready"):
-                return said + ([json.dumps(frame["error"])] if frame["error"] else []), None
+                return output + ([json.dumps(frame["error"])] if frame["error"] else []), None
     except ChildStopped as stop:
-        return said, stop
+        return output, stop
     except KilledFromOutside:
-        return said, ChildStopped(Verdict.HOST_ERROR, "SIGKILL")
+        return output, ChildStopped(Verdict.HOST_ERROR, "SIGKILL")
     except LibrariesNeeded as needed:
-        return said, ChildStopped(Verdict.SANDBOX_VIOLATION, str(needed))
+        return output, ChildStopped(Verdict.SANDBOX_VIOLATION, str(needed))
 
 
 @contextlib.contextmanager

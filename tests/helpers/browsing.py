@@ -22,13 +22,13 @@ DESKTOP: dict[str, Any] = {"viewport": {"width": 1280, "height": 900}}
 @contextmanager
 def chromium() -> Iterator[Browser]:
     """Yield the machine's browser. Tests that need it are skipped if there is none."""
-    found = next((path for name in _NAMES if (path := shutil.which(name))), None)
-    if found is None:
+    executable = next((path for name in _NAMES if (path := shutil.which(name))), None)
+    if executable is None:
         pytest.skip("there is no Chromium here")
     # Chromium's own sandbox does not work for root; the pages are our own.
     flags = ["--no-sandbox"] if os.geteuid() == 0 else []
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, args=flags)
+        browser = playwright.chromium.launch(executable_path=executable, args=flags)
         yield browser
         browser.close()
 
@@ -38,7 +38,7 @@ class OpenPage:
     """A page, its network requests and its error messages."""
 
     page: Page
-    asked: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
 
@@ -47,20 +47,27 @@ def opened(browser: Browser, file: Path, after: str = "", **context: Any) -> Ite
     """Open the page in a file, without a network, and wait until its replay is ready."""
     within = browser.new_context(**context)
     within.set_offline(True)
-    found = OpenPage(within.new_page())
-    page = found.page
-    page.on("request", lambda request: None if request.url.startswith("data:") else found.asked.append(request.url))
-    page.on("pageerror", lambda error: found.complaints.append(str(error)))
-    page.on("console", lambda said: found.complaints.append(said.text) if said.type == "error" else None)
+    opened_page = OpenPage(within.new_page())
+    page = opened_page.page
+    page.on(
+        "request", lambda request: None if request.url.startswith("data:") else opened_page.requests.append(request.url)
+    )
+    page.on("pageerror", lambda error: opened_page.complaints.append(str(error)))
+    page.on(
+        "console",
+        lambda console_message: (
+            opened_page.complaints.append(console_message.text) if console_message.type == "error" else None
+        ),
+    )
 
     def dismiss(dialog: Dialog) -> None:
-        found.complaints.append("a dialog")
+        opened_page.complaints.append("a dialog")
         dialog.dismiss()
 
     page.on("dialog", dismiss)
     page.goto(file.as_uri() + after)
     page.wait_for_selector("section.replay[data-ready]")
-    yield found
+    yield opened_page
     within.close()
 
 
@@ -72,6 +79,9 @@ def follow(link: Locator) -> None:
 
 def assert_in_order(page: Page) -> None:
     """Check that axe finds no fault, and that the page needs no horizontal scrolling."""
-    found = Axe().run(page).response["violations"]
-    assert not found, (page.url, [(each["id"], [node["html"][:200] for node in each["nodes"]]) for each in found])
+    violations = Axe().run(page).response["violations"]
+    assert not violations, (
+        page.url,
+        [(each["id"], [node["html"][:200] for node in each["nodes"]]) for each in violations],
+    )
     assert page.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth"), page.url

@@ -66,9 +66,9 @@ class _Copies:
         self._job(enrolment_id, self._regrade, **regrade)
         answer = {"answer": "It is right.", "actor": "grace", "answered_at": _AT} if number % 2 else {}
         self._add(Appeal, submission_id=submission_id, text="Please look again.", asked_at=_AT, **answer)
-        said = {"submission_id": submission_id, "criterion": self._criterion, "actor": "grace", "made_at": _AT}
-        self._add(Comment, text="Well done.", **said)
-        self._add(Override, marks=Decimal(1), reason="It was close.", **said)
+        comment = {"submission_id": submission_id, "criterion": self._criterion, "actor": "grace", "made_at": _AT}
+        self._add(Comment, text="Well done.", **comment)
+        self._add(Override, marks=Decimal(1), reason="It was close.", **comment)
 
     def _submit(
         self, enrolment_id: int, batch_id: str | None, attempt: int, assignment: str = "", **job: Any
@@ -148,8 +148,8 @@ class _Copies:
 
     def _read(self, kind: type[Base], which: ColumnElement[bool]) -> list[dict[str, Any]]:
         if kind not in self._rows:
-            found = self._session.execute(select(*kind.__table__.columns).where(which)).mappings()
-            self._rows[kind] = [{name: value for name, value in row.items() if name != "id"} for row in found]
+            rows = self._session.execute(select(*kind.__table__.columns).where(which)).mappings()
+            self._rows[kind] = [{name: value for name, value in row.items() if name != "id"} for row in rows]
         return self._rows[kind]
 
     def _add(self, kind: type[Base], /, **values: Any) -> Any:

@@ -63,14 +63,14 @@ def along(points: np.ndarray, heading: np.ndarray, rgb: Sequence[Sequence[float]
     return Recording(**(values | parts))
 
 
-def passes(asked: Criterion, recording: Recording) -> bool:
+def passes(criterion: Criterion, recording: Recording) -> bool:
     """Return whether the recording gets full marks."""
-    result = judged(asked, recording)
+    result = judged(criterion, recording)
     assert result.evidence[0].passed == (result.marks == Decimal(4)), result.message
     return result.evidence[0].passed
 
 
 def measured(result: CriterionResult, name: str) -> float:
     """Return the measure of this name in the first trial."""
-    found: Measure = next(measure for measure in result.evidence[0].measures if measure.name == name)
-    return found.value
+    matching_measure: Measure = next(measure for measure in result.evidence[0].measures if measure.name == name)
+    return matching_measure.value

@@ -52,9 +52,9 @@ def graded(
     given: Mapping[str, str] | None = None,
     tags: Mapping[int, Sequence[str]] | None = None,
 ) -> Grade:
-    asked = assignment(folder, parts, given)
-    submission = read_submission(notebook(folder / "ada.ipynb", cells, tags), required_parts=asked.parts)
-    return grade(submission, asked, runner=runner)
+    graded_assignment = assignment(folder, parts, given)
+    submission = read_submission(notebook(folder / "ada.ipynb", cells, tags), required_parts=graded_assignment.parts)
+    return grade(submission, graded_assignment, runner=runner)
 
 
 def recorded(folder: Path, runner: TrialRunner, cells: Sequence[str], parts: str = "") -> Recording:

@@ -123,9 +123,9 @@ class Installation:
         browser, word = self.browsers[row.who]
         path, form = _filled(row.page, values)
         if row.says:
-            answer = browser.get(_here("", path), params=form)
+            answer = browser.get(_build_address("", path), params=form)
         else:
-            answer = browser.post(_here("", path), data=form | {"csrf": word}, files=_parts(row.files) or None)
+            answer = browser.post(_build_address("", path), data=form | {"csrf": word}, files=_parts(row.files) or None)
         if row.then and answer.status_code == 303:
             answer = browser.post(f"{answer.headers['location']}{row.then}", data={"csrf": word})
         return Answer(answer.status_code, answer.text)
@@ -141,18 +141,18 @@ class Installation:
             options["files"] = _parts(row.files) or [("nothing", (None, ""))]
         else:
             options["json"] = sent
-        answer = self.program.request(method, _here("/api/v1", path), **options)
+        answer = self.program.request(method, _build_address("/api/v1", path), **options)
         return Answer(answer.status_code, answer.text)
 
     def _by_command(self, row: Row, values: Mapping[str, str]) -> Answer:
         group, name, *rest = shlex.split(row.command.format(**values))
-        said = io.StringIO()
+        output = io.StringIO()
         try:
-            with redirect_stdout(said):
+            with redirect_stdout(output):
                 load_command(group, name).main(rest, standalone_mode=False)
         except (RobomarkError, TyperException) as error:
             return Answer(2, str(error))
-        return Answer(0, said.getvalue())
+        return Answer(0, output.getvalue())
 
     def _restored(self, state: str) -> Snapshot:
         snapshot = self.snapshots.get(state)
@@ -205,8 +205,8 @@ def installation_in(
 def _snapshot(web: Web, values: dict[str, str]) -> Snapshot:
     web.store.engine.dispose()
     rows = _rows(web)
-    found = (_ID.findall(each) for some in rows.values() for row in some for each in row if isinstance(each, str))
-    ids = frozenset(id_ for some in found for id_ in some)
+    id_matches = (_ID.findall(each) for some in rows.values() for row in some for each in row if isinstance(each, str))
+    ids = frozenset(id_ for some in id_matches for id_ in some)
     return Snapshot(_database(web).read_bytes(), values, rows, _columns(web, rows), ids)
 
 
@@ -233,12 +233,12 @@ def _plain(row: dict[str, Any], known: frozenset[str]) -> str:
             return "bytes"
         if not isinstance(value, str):
             return value
-        return _ID.sub(lambda found: found[0] if found[0] in known else "new", _TIME.sub("a time", value))
+        return _ID.sub(lambda match: match[0] if match[0] in known else "new", _TIME.sub("a time", value))
 
     return str({name: plain(value) for name, value in row.items() if name not in _UNEQUAL})
 
 
-def _here(prefix: str, path: str) -> str:
+def _build_address(prefix: str, path: str) -> str:
     """Return the address of a path. A path without a leading slash belongs to course 1."""
     return f"{prefix}{path}" if path.startswith("/") else f"{prefix}/courses/1/{path}"
 

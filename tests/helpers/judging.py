@@ -44,11 +44,11 @@ def talk(*exchanges: tuple[str, str | None], arrives: bool = True) -> tuple[Mess
     """Return messages of the robot, a second apart, each with an answer a tenth of a second later."""
     messages: list[Message] = []
     for t, (text, answer) in enumerate(exchanges):
-        asked = len(messages)
+        message_count = len(messages)
         messages.append(Message(float(t), "robot", text, float(t)))
         if answer is not None:
             note = "" if arrives else "undelivered"
-            messages.append(Message(float(t), "responder", answer, t + 0.1 if arrives else None, asked, note))
+            messages.append(Message(float(t), "responder", answer, t + 0.1 if arrives else None, message_count, note))
     return tuple(messages)
 
 
@@ -58,7 +58,7 @@ def lines(*texts: str) -> tuple[TimedText, ...]:
 
 
 def judged(
-    asked: Criterion,
+    rule: Criterion,
     *recordings: Recording,
     visibility: str = "visible",
     poses: Sequence[Pose] = (START,),
@@ -67,7 +67,7 @@ def judged(
     """Judge these recordings by a criterion, with as many trials from each pose as there are recordings."""
     scenario = Scenario("s", tuple(poses), trials=max(len(recordings) // len(poses), 1))
     world = WorldSpec(recordings[0].background) if recordings else WorldSpec()
-    assignment = Assignment("a", "A", world, Parts(), (scenario,), (asked,))
+    assignment = Assignment("a", "A", world, Parts(), (scenario,), (rule,))
     trials = tuple(
         TrialResult("s", index, 1, 0.0, motor_noise, visibility, recording, place=index // scenario.trials)
         for index, recording in enumerate(recordings)
@@ -75,5 +75,5 @@ def judged(
     (result,) = judge(assignment, trials)
     assert 0 <= result.marks <= result.max_marks
     # A criterion about sweeps has no result for a trial without a sweep.
-    assert len(result.evidence) == (0 if asked.check == "robustness" else len(recordings))
+    assert len(result.evidence) == (0 if rule.check == "robustness" else len(recordings))
     return result

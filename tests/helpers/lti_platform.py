@@ -42,7 +42,7 @@ class LearningPlatform:
 
     def claims(self, begun: dict[str, str], subject: str, *roles: str, **changes: Any) -> dict[str, Any]:
         at = int(time.time())
-        said = {
+        payload = {
             "iss": ISSUER,
             "aud": CLIENT,
             "sub": subject,
@@ -62,7 +62,7 @@ class LearningPlatform:
             MEMBERS_CLAIM: {"context_memberships_url": f"{self.url}/members", "service_versions": ["2.0"]},
             GRADES_CLAIM: {"lineitems": f"{self.url}/columns", "scope": []},
         }
-        return {name: value for name, value in (said | changes).items() if value is not None}
+        return {name: value for name, value in (payload | changes).items() if value is not None}
 
     def sign(self, claims: dict[str, Any], key: rsa.RSAPrivateKey | None = None, **header: Any) -> str:
         return jwt.encode(claims, key or self.key, algorithm="RS256", headers={"kid": "k1", **header})
@@ -92,14 +92,14 @@ class LearningPlatform:
             return 200, None
         return 404, {}
 
-    def _give_token(self, asked: dict[str, list[str]]) -> tuple[int, Any]:
-        assertion = asked["client_assertion"][0]
+    def _give_token(self, form: dict[str, list[str]]) -> tuple[int, Any]:
+        assertion = form["client_assertion"][0]
         key = PyJWKSet.from_dict(self.tool_keys)[jwt.get_unverified_header(assertion)["kid"]]
-        said = jwt.decode(assertion, key, algorithms=["RS256"], audience=f"{self.url}/token", issuer=CLIENT)
-        assert said["sub"] == CLIENT
-        assert asked["grant_type"] == ["client_credentials"]
+        claims = jwt.decode(assertion, key, algorithms=["RS256"], audience=f"{self.url}/token", issuer=CLIENT)
+        assert claims["sub"] == CLIENT
+        assert form["grant_type"] == ["client_credentials"]
         token = str(uuid.uuid4())
-        self.tokens[token] = asked["scope"][0]
+        self.tokens[token] = form["scope"][0]
         return 200, {"access_token": token, "token_type": "Bearer", "expires_in": 3600}
 
 

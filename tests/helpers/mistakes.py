@@ -56,14 +56,14 @@ def write_submission(case: Mapping[str, Any], folder: Path) -> Path:
 
 def first_screen(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> str:
     """Return the cause and the next step in the report of a case, or the reason why the submission is refused."""
-    asked = assignment_of(case)
+    assignment = assignment_of(case)
     try:
-        submission = read_submission(write_submission(case, folder), required_parts=asked.parts)
+        submission = read_submission(write_submission(case, folder), required_parts=assignment.parts)
     except UsageError as refusal:
         return str(refusal)
-    graded = grade(submission, asked, runner=runner)
-    told = diagnose(build_student_view(graded).grade, submission)
-    return f"{told.cause}\n{told.next_step}"
+    graded = grade(submission, assignment, runner=runner)
+    diagnosis = diagnose(build_student_view(graded).grade, submission)
+    return f"{diagnosis.cause}\n{diagnosis.next_step}"
 
 
 def _changed(assignment: str, part: str, change: Mapping[str, Any]) -> str:

@@ -14,20 +14,20 @@ def imported_by_moodle(text: str) -> dict[str, tuple[Decimal | None, str]]:
     lines = list(csv.reader(io.StringIO(text.removeprefix("\ufeff"))))
     places = {name: lines[0].index(name) for name in ("Identifier", "Grade", "Last modified (grade)")}
     feedback = lines[0].index("Feedback comments")
-    found = {}
+    grades = {}
     for line in lines[1:]:
         assert len(line) == len(lines[0])
         number = re.fullmatch(r"Participant (\d+)", line[places["Identifier"]])
         assert number is not None
         grade = Decimal(line[places["Grade"]]) if line[places["Grade"]] else None
         assert grade is None or 0 <= grade <= Decimal(line[lines[0].index("Maximum Grade")])
-        found[number[1]] = (grade, line[feedback])
-    return found
+        grades[number[1]] = (grade, line[feedback])
+    return grades
 
 
 def feedback_taken_by_moodle(archive: zipfile.ZipFile) -> dict[str, str]:
     """Apply Moodle's rules for a feedback zip: a part of the path identifies the student, the rest is the file name."""
-    found = {}
+    feedback = {}
     for path in archive.namelist():
         for part in path.split("/"):
             pieces = part.split("_", 4)
@@ -35,5 +35,5 @@ def feedback_taken_by_moodle(archive: zipfile.ZipFile) -> dict[str, str]:
                 continue
             assert pieces[2] in ("assignsubmission", "assignfeedback")
             assert pieces[3] == "file"
-            found[pieces[1]] = path.split("/")[-1]
-    return found
+            feedback[pieces[1]] = path.split("/")[-1]
+    return feedback

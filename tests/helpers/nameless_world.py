@@ -65,17 +65,17 @@ def make_nameless_course(web: Web) -> NamelessCourse:
         web_batch = open_assignments.load_course_assignment(session, 1, ASSIGNMENT).batch_id
     *most, last = STUDENTS
     refusal = RejectedSubmission("zed.docx", "holds no robot program", Student("zed-refused"))
-    asked = [_request(who) for who in most]
-    batch = intake.accept_batch(web.store, "week one", asked, (refusal,), course=COURSE, max_attempts=3)
+    requests = [_request(who) for who in most]
+    batch = intake.accept_batch(web.store, "week one", requests, (refusal,), course=COURSE, max_attempts=3)
     _grade_all(web)
     for number, who in enumerate((last, most[0], last, last)):
         request = _request(who, f"{PROGRAM}# {number}\n")
         intake.accept_submission(web.store, request, max_attempts=3, batch_id=web_batch, max_bytes=10**6)
-    asked = [
+    requests = [
         replace(_request(who, f"{PROGRAM}# with names\n"), assignment=replace(echo(), id=NAMED))
         for who in (*STUDENTS, IDLE)
     ]
-    intake.accept_batch(web.store, "with names", asked, (), course=COURSE, max_attempts=3)
+    intake.accept_batch(web.store, "with names", requests, (), course=COURSE, max_attempts=3)
     _grade_all(web)
     acting.regrade(web.store, batch.id, None, max_attempts=3, actor="grace")
     _grade_all(web, dead=1)

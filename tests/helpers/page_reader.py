@@ -56,4 +56,4 @@ class Reader(HTMLParser):
             self.text += data
 
     def values(self, tag: str, name: str) -> list[str]:
-        return [value for found, attribute, value in self.attributes if (found, attribute) == (tag, name)]
+        return [value for each, attribute, value in self.attributes if (each, attribute) == (tag, name)]

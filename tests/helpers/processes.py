@@ -19,10 +19,10 @@ COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 def until(look: Callable[[], Found | None], what: str = "it does not come") -> Found:
     """Return the first true result of ``look``."""
     begun = time.monotonic()
-    while not (found := look()):
+    while not (value := look()):
         assert time.monotonic() - begun < PATIENCE, what
         time.sleep(0.05)
-    return found
+    return value
 
 
 def alive(pid: int) -> bool:

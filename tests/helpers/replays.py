@@ -65,16 +65,16 @@ def long_recording(ticks: int, images: int = 0) -> Recording:
     return replace(one, ticks=Ticks(**columns), end_t=seconds, images=taken)
 
 
-def poisoned(told: Any, text: str, key: str = "") -> Any:
+def poisoned(data: Any, text: str, key: str = "") -> Any:
     """Return the same data with every text replaced by ``text``."""
-    if dataclasses.is_dataclass(told) and not isinstance(told, type):
-        changed = {each.name: poisoned(getattr(told, each.name), text, each.name) for each in dataclasses.fields(told)}
-        return replace(told, **changed)
-    if isinstance(told, Mapping):
-        return {each: poisoned(value, text, each) for each, value in told.items()}
-    if isinstance(told, list | tuple):
-        return type(told)(poisoned(value, text, key) for value in told)
-    return text if type(told) is str and key not in _NO_TEXTS else told
+    if dataclasses.is_dataclass(data) and not isinstance(data, type):
+        changed = {each.name: poisoned(getattr(data, each.name), text, each.name) for each in dataclasses.fields(data)}
+        return replace(data, **changed)
+    if isinstance(data, Mapping):
+        return {each: poisoned(value, text, each) for each, value in data.items()}
+    if isinstance(data, list | tuple):
+        return type(data)(poisoned(value, text, key) for value in data)
+    return text if type(data) is str and key not in _NO_TEXTS else data
 
 
 def parting_grade(after: int = 90) -> Grade:
@@ -97,10 +97,10 @@ def parting_grade(after: int = 90) -> Grade:
             for each in COLUMNS
         }
         end = Pose(*(float(columns[name][-1]) for name in ("x", "y", "heading")))
-        said = (TimedText(0.5, "off I go"), TimedText(3.5, "straight on"), TimedText(11.5, "there"))
+        speech = (TimedText(0.5, "off I go"), TimedText(3.5, "straight on"), TimedText(11.5, "there"))
         ticks = Ticks(**columns)
         return replace(
-            trial, recording=replace(recording, ticks=ticks, end=end, end_t=12.0, printed=(), spoken=said, touches=())
+            trial, recording=replace(recording, ticks=ticks, end=end, end_t=12.0, printed=(), spoken=speech, touches=())
         )
 
     return replace(grade, trials=tuple(other(trial) for trial in grade.trials))

@@ -255,10 +255,10 @@ def hidden_grade() -> Grade:
     accuracy = grade.accuracy
     assert accuracy is not None
     of_four = replace(accuracy, n=4, value=1.0, confusion=tuple((name, name, 1) for name in SHAPES[:4]))
-    told = tuple(
+    criteria = tuple(
         replace(result, shown=VisibleFeedback(f"VISIBLE: {result.title}", of_four)) for result in grade.criteria
     )
-    return replace(grade, trials=trials, criteria=(*told, secret))
+    return replace(grade, trials=trials, criteria=(*criteria, secret))
 
 
 def hostile_grade() -> Grade:

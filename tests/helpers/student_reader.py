@@ -32,15 +32,15 @@ class StudentReader:
 
     def everything(self, when: str = "") -> dict[str, object]:
         """Return the answer of each path, also as a partial page for htmx. A zip is returned as its files."""
-        found: dict[str, object] = {}
+        responses: dict[str, object] = {}
         for route, part in itertools.product(self._routes, ({}, {"hx-request": "true"})):
             if part and route.startswith(_PREFIX):
                 continue
             path = re.sub(r"\{(\w+)(:\w+)?\}", lambda name: self._values[name[1]], route)
             headers = part | (self._token if path.startswith(_PREFIX) else {})
             client = self._program if path.startswith(_PREFIX) else self._browser
-            found[f"{path} {when}{' in part' if part else ''}"] = _content(client.get(path, headers=headers))
-        return found
+            responses[f"{path} {when}{' in part' if part else ''}"] = _content(client.get(path, headers=headers))
+        return responses
 
 
 def _content(answer: Response) -> str | dict[str, str]:

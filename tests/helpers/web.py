@@ -79,8 +79,8 @@ class Web:
     def join(self, member: Member, other: Member, *, from_platform: bool = False) -> None:
         """Merge two members into one person, as an operator does."""
         service = self.app.state.context.service
-        asked = JoinRequest(member.enrolment_id, other.enrolment_id, from_platform)
-        operations.join(service, Actor("operator", operator=True), asked)
+        request = JoinRequest(member.enrolment_id, other.enrolment_id, from_platform)
+        operations.join(service, Actor("operator", operator=True), request)
 
     def operator(self, who: str = "root") -> Member:
         member = self.instructor(who, "operators")
@@ -101,9 +101,9 @@ def web_in(folder: Path, **changes: Any) -> Iterator[Web]:
 
 def csrf(answer: Response) -> str:
     """Return the CSRF token in the forms of a page."""
-    found = re.search(r'name="csrf" value="([0-9a-f]+)"', answer.text)
-    assert found, answer.text[:2000]
-    return unescape(found[1])
+    match = re.search(r'name="csrf" value="([0-9a-f]+)"', answer.text)
+    assert match, answer.text[:2000]
+    return unescape(match[1])
 
 
 def submit(client: TestClient, path: str, data: dict[str, Any] | None = None, **options: Any) -> Response:

@@ -83,13 +83,13 @@ def _tryout(web: Web, member: Member) -> str:
     packed = pack_submission(grading_request("ada").submission)
     with web.store.transaction() as session:
         version_id = open_assignments.load_course_assignment(session, 1, "echo-responder").version_id
-        asked = test_runs.queue_test_run(session, member.enrolment_id, version_id, packed)
+        test_run = test_runs.queue_test_run(session, member.enrolment_id, version_id, packed)
     claimed = test_runs.claim_test_run(web.store, 60)
     assert claimed is not None
-    said = {"tone": "good", "happened": "The program ended by itself.", "whose": "", "seconds": 2.0}
+    result = {"tone": "good", "happened": "The program ended by itself.", "whose": "", "seconds": 2.0}
     more = {"lines": [], "more_lines": 0, "faults": [], "failed": "", "notes": []}
-    test_runs.finish_test_run(web.store, claimed, said | more, zlib.compress(b"{}"))
-    return asked
+    test_runs.finish_test_run(web.store, claimed, result | more, zlib.compress(b"{}"))
+    return test_run
 
 
 def create_upload(web: Web, member: Member) -> str:
@@ -102,7 +102,7 @@ def create_upload(web: Web, member: Member) -> str:
 
 def filled(path: str, values: dict[str, str]) -> str:
     """Return a route's path with its parameters filled in."""
-    return re.sub(r"\{(\w+)(:\w+)?\}", lambda found: values[found[1]], path)
+    return re.sub(r"\{(\w+)(:\w+)?\}", lambda match: values[match[1]], path)
 
 
 def _grade_all(web: Web) -> None:

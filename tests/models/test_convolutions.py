@@ -61,7 +61,7 @@ def test_slopes_are_what_a_small_step_changes() -> None:
         slopes = layer.backward(slopes)
     step = 1e-2
     for layer in layers:
-        for weights, found in zip(layer.weights, layer.gradients, strict=True):
+        for weights, each in zip(layer.weights, layer.gradients, strict=True):
             way = CHANCE.normal(size=weights.shape).astype(np.float32)
             way /= np.linalg.norm(way)
             start = weights.copy()
@@ -70,16 +70,16 @@ def test_slopes_are_what_a_small_step_changes() -> None:
             weights[...] = start - step * way
             before = float((scores(layers, images) * towards).sum())
             weights[...] = start
-            assert (after - before) / (2 * step) == pytest.approx(float((found * way).sum()), rel=0.05, abs=0.02)
+            assert (after - before) / (2 * step) == pytest.approx(float((each * way).sum()), rel=0.05, abs=0.02)
 
 
 def test_the_file_answers_as_the_layers_do() -> None:
     layers, images = network(), CHANCE.random((5, 10, 10, 1), dtype=np.float32)
     powers = np.exp(scores(layers, images))
     session = onnxruntime.InferenceSession(build_onnx_file(layers, 10, 3))
-    (asked,) = session.get_inputs()
-    assert asked.shape == ["n", 1, 10, 10]
-    (shares,) = session.run(None, {asked.name: images.transpose(0, 3, 1, 2)})
+    (input_node,) = session.get_inputs()
+    assert input_node.shape == ["n", 1, 10, 10]
+    (shares,) = session.run(None, {input_node.name: images.transpose(0, 3, 1, 2)})
     assert np.allclose(shares, powers / powers.sum(axis=1, keepdims=True), atol=1e-6)
 
 

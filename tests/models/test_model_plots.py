@@ -63,9 +63,9 @@ def test_the_confusion_has_all_counts_and_the_interval(evaluation: Evaluation) -
 
 def test_misread_images_stand_beside_right_ones_each_kind_first(evaluation: Evaluation) -> None:
     drawing = draw_evaluation_misread(evaluation)
-    shown = texts(drawing)
-    assert "all 3 misread, of n = 18 images; 14 × 14 grey pixels" in shown
-    assert [text for text in shown if text.startswith("✗")] == [
+    labels = texts(drawing)
+    assert "all 3 misread, of n = 18 images; 14 × 14 grey pixels" in labels
+    assert [text for text in labels if text.startswith("✗")] == [
         "✗ read as diamond",
         "✗ read as right facing triangle",
         "✗ read as diamond",
@@ -78,7 +78,7 @@ def test_misread_images_stand_beside_right_ones_each_kind_first(evaluation: Eval
 
 def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: Evaluation) -> None:
     drawing = draw_robustness(evaluation)
-    shown = texts(drawing)
+    actual = texts(drawing)
     labels = (
         "light noise, grey levels either way",
         "offset in x, mm",
@@ -88,8 +88,8 @@ def test_robustness_has_a_panel_for_each_condition_with_unit_and_n(evaluation: E
         "size of the image, %",
         "covered square, mm each way",
     )
-    assert [text for text in shown if text in labels] == list(labels)
-    assert shown.count("n = 6 to 120 images per point") == 4
+    assert [text for text in actual if text in labels] == list(labels)
+    assert actual.count("n = 6 to 120 images per point") == 4
     values = evaluation.measured.curves[1].values
     marks = [item.points[:, 0] for item in drawing.items if isinstance(item, Marks)][1]
     # The marks are on one scale: inches grow with the values.

@@ -98,8 +98,8 @@ def test_all_shapes_are_right_on_the_spot_whatever_the_noise() -> None:
 def test_shapes_beside_the_spot_are_no_worse_than_with_the_courses_network(
     varied: str, value: float, of_the_course: int
 ) -> None:
-    found = curve("shapes", varied)
-    tally = found.tallies[found.values.index(value)]
+    accuracies = curve("shapes", varied)
+    tally = accuracies.tallies[accuracies.values.index(value)]
     assert tally.n == 6
     assert tally.right == 6 >= of_the_course
 
@@ -124,8 +124,8 @@ def test_the_convolutional_network_reads_digits_better_than_the_perceptrons(
     varied: str, under: str, values: tuple[float, ...], least: float
 ) -> None:
     def tallies(name: str) -> list[Tally]:
-        found = curve(name, varied, under)
-        return [found.tallies[found.values.index(value)] for value in values]
+        accuracies = curve(name, varied, under)
+        return [accuracies.tallies[accuracies.values.index(value)] for value in values]
 
     for ours, first, second in zip(*map(tallies, ("digits-cnn", "digits", "digits-28")), strict=True):
         assert ours.n == first.n == second.n == 1320
@@ -144,8 +144,8 @@ def test_the_convolutional_network_reads_digits_better_than_the_perceptrons(
 def test_shapes_of_an_image_of_ones_own_are_named_rightly(
     varied: str, under: str, values: tuple[float, ...], least: float
 ) -> None:
-    found = curve("shapes", varied, under)
-    assert all(found.tallies[found.values.index(value)].share >= least for value in values)
+    accuracies = curve("shapes", varied, under)
+    assert all(accuracies.tallies[accuracies.values.index(value)].share >= least for value in values)
 
 
 def test_a_shape_that_is_not_altered_is_what_the_sensor_sees() -> None:

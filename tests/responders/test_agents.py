@@ -55,7 +55,7 @@ def replies(recording: Recording) -> list[str]:
     return [message.text for message in recording.messages if message.sender == "responder"]
 
 
-def told(recording: Recording) -> list[tuple[str, str, str]]:
+def list_agent_messages(recording: Recording) -> list[tuple[str, str, str]]:
     return [(each.sender, each.receiver, each.text) for each in recording.agent_messages]
 
 
@@ -63,7 +63,7 @@ def test_questions_go_from_process_to_process_and_back(runner: TrialRunner) -> N
     recording = run(runner)
     assert recording.verdict is Verdict.FINISHED
     assert replies(recording) == ["Py saw: 0", "Py saw: 1", "Py saw: 2"]
-    assert told(recording)[:6] == [
+    assert list_agent_messages(recording)[:6] == [
         ("responder", "agent", "PY::0"),
         ("agent", "parser", "PY::0"),
         ("parser", "agent", "0"),

@@ -76,9 +76,9 @@ def test_an_assignment_may_want_it(runner: TrialRunner) -> None:
     scenario = Scenario("one", (START,), seconds=10)
     ends = []
     for world in (WorldSpec(), WorldSpec(tick="browser")):
-        asked = Assignment("a", "A", world, Parts("student", "none"), (scenario,), ())
+        assignment = Assignment("a", "A", world, Parts("student", "none"), (scenario,), ())
         submission = Submission(
             "ada", program=SourceFile("robot.py", "import time\ntank_drive.on(50, 50)\ntime.sleep(6.6)\n")
         )
-        ends.append(grade(submission, asked, runner=runner).trials[0].recording.end.x)
+        ends.append(grade(submission, assignment, runner=runner).trials[0].recording.end.x)
     assert ends[1] - ends[0] == pytest.approx(2 * 525 / 30 * np.pi * 56 / 360)

@@ -33,8 +33,8 @@ def test_an_answer_arrives_after_the_delay_and_what_the_responder_slept() -> Non
     assert talk.deliver(SECOND + DELAY - 1) == []
     assert talk.deliver(SECOND + DELAY) == ["1"]
     assert talk.deliver(SECOND + DELAY + TICK) == []
-    asked, answered = talk.messages
-    assert (asked.t, asked.delivered) == (0, 0)
+    question, answered = talk.messages
+    assert (question.t, question.delivered) == (0, 0)
     assert (answered.t, answered.delivered, answered.reply_to, answered.note) == (1.0, pytest.approx(1.1), 0, "")
 
 

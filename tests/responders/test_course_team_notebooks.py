@@ -38,11 +38,11 @@ def in_order(wanted: list[str], text: str) -> list[str]:
     """Return the texts that are missing or out of order."""
     missing, at = [], 0
     for each in wanted:
-        found = text.find(each, at)
-        if found < 0:
+        position = text.find(each, at)
+        if position < 0:
             missing.append(each)
         else:
-            at = found + len(each)
+            at = position + len(each)
     return missing
 
 
@@ -66,10 +66,10 @@ def test_it_runs_from_top_to_bottom(folder: Path, runner: TrialRunner) -> None:
     assert [str(each.verdict) for each in recordings] == expected.get("verdicts", ["finished"] * len(recordings))
     notes = expected.get("notes", [])
     assert [note for note in notebook.notes if not note.startswith(tuple(notes))] == []
-    assert [note for note in notes if not any(told.startswith(note) for told in notebook.notes)] == []
+    assert [note for note in notes if not any(notebook_note.startswith(note) for notebook_note in notebook.notes)] == []
     # No path to this machine's modules is shown.
-    told = "\n".join([notebook.output, *notebook.notes, *(fault.message for fault in notebook.raised)])
-    assert re.findall(r"\S*(?:site-packages|/responders/|/lib/python)\S*", told) == []
+    notebook_note = "\n".join([notebook.output, *notebook.notes, *(fault.message for fault in notebook.raised)])
+    assert re.findall(r"\S*(?:site-packages|/responders/|/lib/python)\S*", notebook_note) == []
 
 
 def test_there_are_twelve() -> None:

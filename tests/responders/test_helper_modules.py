@@ -64,8 +64,8 @@ def graded(
     own.mkdir()
     for name, source in files.items():
         (own / name).write_text(source)
-    asked = read_assignment(task)
-    return grade(read_submission(own, required_parts=asked.parts), asked, runner=runner)
+    assignment = read_assignment(task)
+    return grade(read_submission(own, required_parts=assignment.parts), assignment, runner=runner)
 
 
 def first_fault(result: Grade) -> Fault:
@@ -133,8 +133,8 @@ def test_a_responders_and_a_cells_fault_have_it_too(tmp_path: Path, runner: Tria
     own.mkdir()
     notebook(own / "ada.ipynb", cells)
     (own / "helper.py").write_text(files["helper.py"])
-    asked = read_assignment(tmp_path / "task")
-    notes = grade(read_submission(own, required_parts=asked.parts), asked, runner=runner).notes
+    assignment = read_assignment(tmp_path / "task")
+    notes = grade(read_submission(own, required_parts=assignment.parts), assignment, runner=runner).notes
     assert any(note.startswith("cell 2, line 2 of helper.py: ZeroDivisionError") for note in notes)
 
 
@@ -143,8 +143,8 @@ def test_no_such_file_stands_in_for_another_module(tmp_path: Path, runner: Trial
     files = {"robot.py": f"import {name}\nprint(hasattr({name}, 'forged'))\n", f"{name}.py": "forged = True\n"}
     recording = graded(tmp_path, runner, files, responder="none").trials[0].recording
     assert [line.text for line in recording.printed] == ["False"]
-    told = f"the program: {name}.py is never imported: there is another module of that name, which comes first"
-    assert told in recording.notes
+    expected_note = f"the program: {name}.py is never imported: there is another module of that name, which comes first"
+    assert expected_note in recording.notes
 
 
 def test_what_lies_elsewhere_is_still_not_imported(tmp_path: Path, runner: TrialRunner) -> None:
@@ -180,12 +180,12 @@ def test_rules_for_a_program_leave_the_responders_files_alone(tmp_path: Path, ru
 def test_what_the_assignment_brings_imports_nothing_of_the_students(tmp_path: Path, runner: TrialRunner) -> None:
     given = {"drive.py": DRIVE, "talk.py": ANSWER, "helper.py": HELPER}
     mine = {"responder.py": ANSWER, "helper.py": "def words(n):\n    return 'forged'\n"}
-    told = graded(tmp_path, runner, mine, "responder", program="drive.py", given=given).trials[0].recording.messages
-    assert [message.text for message in told] == ["PY::hello hello hello ", "heard forged"]
+    messages = graded(tmp_path, runner, mine, "responder", program="drive.py", given=given).trials[0].recording.messages
+    assert [message.text for message in messages] == ["PY::hello hello hello ", "heard forged"]
     (tmp_path / "second").mkdir()
     mine = {"robot.py": DRIVE, "helper.py": mine["helper.py"]}
-    told = graded(tmp_path / "second", runner, mine, responder="talk.py", given=given).trials[0].recording.messages
-    assert [message.text for message in told] == ["PY::forged", "heard hello hello "]
+    messages = graded(tmp_path / "second", runner, mine, responder="talk.py", given=given).trials[0].recording.messages
+    assert [message.text for message in messages] == ["PY::forged", "heard hello hello "]
 
 
 def test_another_helper_is_another_submission_with_other_chance(tmp_path: Path, runner: TrialRunner) -> None:

@@ -59,9 +59,13 @@ def of_responder(runner: TrialRunner, text: str) -> list[str]:
 
 def of_notebook(folder: Path, runner: TrialRunner, text: str) -> Recording:
     cells = [text, "def responder(text):\n    return text", "%%sim_magic_preloaded\npass"]
-    asked = find_assignment("echo-responder")
+    assignment = find_assignment("echo-responder")
     return (
-        grade(read_submission(notebook(folder / "ada.ipynb", cells), required_parts=asked.parts), asked, runner=runner)
+        grade(
+            read_submission(notebook(folder / "ada.ipynb", cells), required_parts=assignment.parts),
+            assignment,
+            runner=runner,
+        )
         .trials[0]
         .recording
     )
@@ -74,9 +78,9 @@ def test_dates_are_of_one_type(tmp_path: Path, runner: TrialRunner) -> None:
 
 
 def test_libraries_work_in_a_robot_program_as_in_a_responder(runner: TrialRunner) -> None:
-    (told,) = of_program(runner, LIBRARIES)
-    assert told.startswith("a 2020 (2, 3) 0.")
-    assert of_program(runner, LIBRARIES) == [told]
+    (output,) = of_program(runner, LIBRARIES)
+    assert output.startswith("a 2020 (2, 3) 0.")
+    assert of_program(runner, LIBRARIES) == [output]
     (other,) = of_responder(runner, LIBRARIES)
     assert other.startswith("a 2020 (2, 3) 0.")
 
@@ -102,6 +106,6 @@ def test_no_warning_is_a_text_of_the_students(tmp_path: Path, runner: TrialRunne
             (5, "UserWarning: careful"),
         )
     )
-    told = of_notebook(tmp_path, runner, WARNS)
-    assert "careful" not in told.responder_output
-    assert "cell 1, line 5: UserWarning: careful" in told.notes
+    notes = of_notebook(tmp_path, runner, WARNS)
+    assert "careful" not in notes.responder_output
+    assert "cell 1, line 5: UserWarning: careful" in notes.notes

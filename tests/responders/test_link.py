@@ -191,10 +191,10 @@ TURNS = (
 def test_the_recording_says_of_each_text_why_it_was_lost(runner: TrialRunner) -> None:
     channel = Channel(**INFRARED)
     recording = run_program(runner, TURNS, Pose(1200, 300, 90), responder=ECHO, channel=channel)
-    asked = [message for message in recording.messages if message.sender == "robot"]
-    assert {message.lost for message in asked} == {"", "facing away"}
-    assert all((abs(message.angle or 0) > 45) is (message.lost == "facing away") for message in asked)
-    assert all((message.delivered is None) is bool(message.lost) for message in asked)
+    robot_messages = [message for message in recording.messages if message.sender == "robot"]
+    assert {message.lost for message in robot_messages} == {"", "facing away"}
+    assert all((abs(message.angle or 0) > 45) is (message.lost == "facing away") for message in robot_messages)
+    assert all((message.delivered is None) is bool(message.lost) for message in robot_messages)
     again = run_program(runner, TURNS, Pose(1200, 300, 90), responder=ECHO, channel=channel)
     assert again.sha256 == recording.sha256
     assert from_bytes(to_bytes(recording)).messages == recording.messages

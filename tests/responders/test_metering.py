@@ -153,9 +153,11 @@ def test_only_the_marked_run_of_a_notebook_has_lines(
     monkeypatch.setattr(notebook_executor, "build_recording", keep)
     run = '%%sim_magic_preloaded -b Empty_Map -R\nprint("PY::1")\n'
     path = notebook(tmp_path / "eve.ipynb", ["def responder(text):\n    return text\n", run, run])
-    asked = find_assignment("echo-responder")
-    asked = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios[:1]))
-    grade(read_submission(path, required_parts=asked.parts), asked, runner=runner)
+    assignment = find_assignment("echo-responder")
+    assignment = replace(
+        assignment, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in assignment.scenarios[:1])
+    )
+    grade(read_submission(path, required_parts=assignment.parts), assignment, runner=runner)
     assert sorted({bool(each.places) for each in made}) == [False, True]
 
 

@@ -180,16 +180,16 @@ def mutant(number: int) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
+def marked_assignment(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
     folder = tmp_path_factory.mktemp("mutants")
     (folder / "assignment.toml").write_text(ASSIGNMENT)
     return read_assignment(folder)
 
 
-def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
+def handled(path: Path, marked_assignment: Assignment, runner: TrialRunner) -> str:
     """Return ``graded``, or the sentence of the refusal."""
     try:
-        submission = read_submission(path, required_parts=asked.parts)
+        submission = read_submission(path, required_parts=marked_assignment.parts)
     except UsageError as refusal:
         sentence = str(refusal)
         assert "\n" not in sentence
@@ -197,7 +197,7 @@ def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
         assert "expected" in sentence
         assert len(sentence) < 300
         return sentence
-    result = grade(submission, asked, runner=runner)
+    result = grade(submission, marked_assignment, runner=runner)
     assert len(result.trials) == 1
     assert result.verdict not in ("host_error", "assignment_error")
     return "graded"
@@ -205,31 +205,31 @@ def handled(path: Path, asked: Assignment, runner: TrialRunner) -> str:
 
 @pytest.mark.parametrize("group", [pytest.param(each, marks=[pytest.mark.long] * (each > 0)) for each in range(4)])
 def test_each_is_graded_or_refused_with_one_sentence(
-    group: int, tmp_path: Path, asked: Assignment, runner: TrialRunner
+    group: int, tmp_path: Path, marked_assignment: Assignment, runner: TrialRunner
 ) -> None:
     outcomes = []
     for number in range(group * 50, group * 50 + 50):
         path = tmp_path / f"mutant-{number}.ipynb"
         path.write_bytes(mutant(number))
-        outcomes.append(handled(path, asked, runner))
+        outcomes.append(handled(path, marked_assignment, runner))
     assert 15 < outcomes.count("graded") < 48
 
 
-def test_sizes_have_a_limit_and_a_sentence(tmp_path: Path, asked: Assignment, runner: TrialRunner) -> None:
+def test_sizes_have_a_limit_and_a_sentence(tmp_path: Path, marked_assignment: Assignment, runner: TrialRunner) -> None:
     path = tmp_path / "large.ipynb"
     whole = document(CELLS)
     whole["cells"][0]["outputs"] = [{"data": {"image/png": "A" * (50 << 20)}}]
     path.write_text(json.dumps(whole))
-    assert "is too large, expected at most 16 MB a file; clear its outputs" in handled(path, asked, runner)
+    assert "is too large, expected at most 16 MB a file; clear its outputs" in handled(path, marked_assignment, runner)
     path.write_text('{"cells": [' + "[]," * 4_000_000 + "[]]}")
-    assert "has too much output in it" in handled(path, asked, runner)
+    assert "has too much output in it" in handled(path, marked_assignment, runner)
     path.write_text(json.dumps(document(["x = 1"] * 10_000)))
-    assert "has 10000 code cells, expected at most 5000" in handled(path, asked, runner)
+    assert "has 10000 code cells, expected at most 5000" in handled(path, marked_assignment, runner)
     path.write_text(json.dumps(document([*CELLS, "# " + "x" * (1 << 20)])))
-    assert "has too much code, expected at most 1 MB" in handled(path, asked, runner)
+    assert "has too much code, expected at most 1 MB" in handled(path, marked_assignment, runner)
 
 
-def test_thousands_of_cells_are_run(tmp_path: Path, asked: Assignment, runner: TrialRunner) -> None:
+def test_thousands_of_cells_are_run(tmp_path: Path, marked_assignment: Assignment, runner: TrialRunner) -> None:
     path = tmp_path / "long.ipynb"
     path.write_text(json.dumps(document([*["x = 1"] * 4_900, *CELLS])))
-    assert handled(path, asked, runner) == "graded"
+    assert handled(path, marked_assignment, runner) == "graded"

@@ -286,10 +286,10 @@ def test_no_path_of_the_machine_is_told(tmp_path: Path, runner: TrialRunner) -> 
         PROGRAM,
     ]
     result = graded(tmp_path, runner, cells)
-    told = "\n".join([*result.notes, result.trials[0].recording.responder_output])
-    assert "cannot import name 'no_such_name' from 'numpy' (numpy/__init__.py)" in told
-    assert "No such file or directory: 'missing.txt'" in told
-    assert "here ." in told
-    assert str(Path(sys.prefix)) not in told
-    assert "/tmp/" not in told
-    assert "/lib/python" not in told
+    output = "\n".join([*result.notes, result.trials[0].recording.responder_output])
+    assert "cannot import name 'no_such_name' from 'numpy' (numpy/__init__.py)" in output
+    assert "No such file or directory: 'missing.txt'" in output
+    assert "here ." in output
+    assert str(Path(sys.prefix)) not in output
+    assert "/tmp/" not in output
+    assert "/lib/python" not in output

@@ -50,9 +50,11 @@ def messaging(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 def test_the_course_notebook_gets_full_marks_for_each_of_its_programs(
     messaging: Path, runner: TrialRunner, name: str, cell: str, marks: int
 ) -> None:
-    found = find_assignment(name)
-    asked = replace(found, parts=replace(found.parts, cell=cell), scenarios=found.scenarios[:1])
-    result = grade(read_submission(messaging, required_parts=asked.parts), asked, runner=runner)
+    tested_assignment = find_assignment(name)
+    graded_assignment = replace(
+        tested_assignment, parts=replace(tested_assignment.parts, cell=cell), scenarios=tested_assignment.scenarios[:1]
+    )
+    result = grade(read_submission(messaging, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
     lost = [each for each in result.criteria if each.marks < each.max_marks and each.id != "shape-in-noise"]
     assert lost == []
     assert result.verdict is Verdict.FINISHED
@@ -193,8 +195,8 @@ def test_what_is_marked_instead_is_told(tmp_path: Path, runner: TrialRunner) -> 
 
 def test_a_responder_that_comes_too_late_is_told_with_its_cell(tmp_path: Path, runner: TrialRunner) -> None:
     recording = recorded(tmp_path, runner, [PROGRAM, "x = 1", RESPONDER, "y = 2"])
-    told = {(fault.message, fault.hint) for fault in recording.faults}
-    assert told == {
+    messages = {(fault.message, fault.hint) for fault in recording.faults}
+    assert messages == {
         ("the responder is defined in cell 3, after the robot of cell 1 has run", "Move cell 3 above cell 1.")
     }
     assert "there is no responder" in recorded(tmp_path, runner, [PROGRAM, "x = 1"]).faults[0].message
@@ -218,10 +220,10 @@ def test_a_marked_cell_that_fails_is_told_with_its_line(tmp_path: Path, runner: 
     ],
 )
 def test_a_notebook_without_the_cell_asked_for_is_refused(tmp_path: Path, cell: str, words: str) -> None:
-    asked = assignment(tmp_path, f"cell = {cell}")
+    graded_assignment = assignment(tmp_path, f"cell = {cell}")
     path = notebook(tmp_path / "ada.ipynb", [RESPONDER, PROGRAM], {1: ["plain"]})
     with pytest.raises(UsageError) as refused:
-        read_submission(path, required_parts=asked.parts)
+        read_submission(path, required_parts=graded_assignment.parts)
     assert words in str(refused.value)
 
 

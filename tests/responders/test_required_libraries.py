@@ -104,14 +104,14 @@ def test_the_robots_of_a_notebook_do_not_count() -> None:
 def test_what_is_loaded_beside_libraries_is_the_same(runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = [FunctionCall(name) for name in ("names", "settings", "of_any_warning")]
 
-    def told(needed: bool) -> list[object]:
+    def read_values(needed: bool) -> list[object]:
         monkeypatch.setattr(responders.trial_spec, "may_need_libraries", lambda *_: needed)
         called = runner.call_functions(_spec(LOADED), calls, 1)
         return [each.value for each in called.returned]
 
-    without = told(False)
+    without = read_values(False)
     assert None not in without
-    assert without == told(True)
+    assert without == read_values(True)
 
 
 def test_a_library_that_is_imported_after_all_is_as_if_it_had_been_expected(

@@ -118,28 +118,28 @@ KINDS: dict[str, Callable[[TrialRunner, Path], str]] = {
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory: pytest.TempPathFactory) -> tuple[bool, dict[str, list[list[Any]]]]:
+def recorded_answers(tmp_path_factory: pytest.TempPathFactory) -> tuple[bool, dict[str, list[list[Any]]]]:
     """Return whether addresses are fixed here, and the reports of children of each kind.
 
     The two children of each kind come from zygotes with different histories, in a process with other open files.
     """
-    found: dict[str, list[list[Any]]] = {kind: [] for kind in KINDS}
+    answers: dict[str, list[list[Any]]] = {kind: [] for kind in KINDS}
     for kinds, files in ((list(KINDS), 0), (list(reversed(KINDS)), 100)):
         with contextlib.ExitStack() as opened, TrialRunner() as runner:
             for _ in range(files):
                 opened.enter_context(Path(os.devnull).open())
             fixed = "fixed addresses" in runner.check_sandbox()
             for kind in kinds * 2:
-                found[kind].append(ast.literal_eval(KINDS[kind](runner, tmp_path_factory.mktemp("kind"))))
-    return fixed, found
+                answers[kind].append(ast.literal_eval(KINDS[kind](runner, tmp_path_factory.mktemp("kind"))))
+    return fixed, answers
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_is_the_same_in_two_fresh_zygotes_and_in_the_next_child(
-    kind: str, said: tuple[bool, dict[str, list[list[Any]]]]
+    kind: str, recorded_answers: tuple[bool, dict[str, list[list[Any]]]]
 ) -> None:
-    fixed, found = said
-    texts, places = zip(*found[kind], strict=True)
+    fixed, answers = recorded_answers
+    texts, places = zip(*answers[kind], strict=True)
     assert all(each == texts[0] for each in texts)
     # If the machine cannot fix addresses, the grade does not list this layer.
     assert not fixed or all(each == places[0] for each in places)

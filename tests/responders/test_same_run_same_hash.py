@@ -144,7 +144,7 @@ ELSEWHERE = textwrap.dedent("""
 
 @pytest.mark.long
 def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner) -> None:
-    here = {name: chain(name, runner) for name in RUNS}
+    local_chains = {name: chain(name, runner) for name in RUNS}
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     try:
         for number in range(5):
@@ -157,7 +157,7 @@ def test_ten_processes_in_shuffled_order_beside_a_busy_core(runner: TrialRunner)
             for process in pair:
                 output, _ = process.communicate(timeout=300)
                 assert process.returncode == 0
-                assert dict(line.split() for line in output.splitlines()) == here
+                assert dict(line.split() for line in output.splitlines()) == local_chains
     finally:
         busy.kill()
         busy.wait()

@@ -76,9 +76,9 @@ def calls(recording: Recording) -> list[tuple[str, str]]:
 
 
 def compared(diagram: Diagram, recording: Recording) -> str:
-    found = compare_with_recording(diagram, count_messages(recording))
-    assert found is not None
-    return describe_differences(found)
+    comparison = compare_with_recording(diagram, count_messages(recording))
+    assert comparison is not None
+    return describe_differences(comparison)
 
 
 def driven(runner: TrialRunner, start: Pose, responder: str = "") -> Recording:
@@ -130,9 +130,9 @@ def test_2_echo_and_logger(executed: ExecutedNotebook) -> None:
     ]
     assert [line.text for line in recording.spoken] == ["all done"]
     assert calls(recording) == [("responder", "parser"), ("responder", "logger")] * 3
-    shown = executed.output.split("--- cell 13 ---\n")[1].split("--- cell")[0]
-    assert shown.startswith("# Responder logfile\n# -----------------\nReceived message: 0\n")
-    assert shown.count("---\n") == 3 + 1
+    output = executed.output.split("--- cell 13 ---\n")[1].split("--- cell")[0]
+    assert output.startswith("# Responder logfile\n# -----------------\nReceived message: 0\n")
+    assert output.count("---\n") == 3 + 1
 
 
 def test_3_state_is_passed_by_agent_and_json(executed: ExecutedNotebook) -> None:

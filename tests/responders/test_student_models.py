@@ -41,18 +41,18 @@ LOAD = 'import joblib\nnetwork = joblib.load("model.joblib")\ndef responder(text
 
 
 def graded(folder: Path, runner: TrialRunner) -> Grade:
-    asked = find_assignment(str(FOLDER))
-    return grade(read_submission(folder, required_parts=asked.parts), asked, runner=runner)
+    assignment = find_assignment(str(FOLDER))
+    return grade(read_submission(folder, required_parts=assignment.parts), assignment, runner=runner)
 
 
 @pytest.mark.parametrize("name", sorted(EXPECTED))
 def test_a_model_gets_marks_or_a_sentence(name: str, runner: TrialRunner) -> None:
     wanted = EXPECTED[name]
     result = graded(FOLDER / name, runner)
-    told = "\n".join(criterion.message for criterion in result.criteria)
-    assert (str(result.verdict), result.marks) == (wanted["verdict"], Decimal(wanted["marks"])), told
+    messages = "\n".join(criterion.message for criterion in result.criteria)
+    assert (str(result.verdict), result.marks) == (wanted["verdict"], Decimal(wanted["marks"])), messages
     for phrase in wanted["feedback"]:
-        assert phrase in told
+        assert phrase in messages
     noted = "\n".join(note for trial in result.trials for note in trial.recording.notes)
     for phrase in wanted.get("notes", ()):
         assert phrase in noted
@@ -176,11 +176,11 @@ def test_a_hostile_pickle_touches_nothing_outside(deed: str, runner: TrialRunner
 
 
 def test_a_model_of_more_than_16_mb_is_refused_by_name(tmp_path: Path) -> None:
-    asked = find_assignment(str(FOLDER))
+    assignment = find_assignment(str(FOLDER))
     (tmp_path / "responder.py").write_text("def responder(text): return text\n")
     (tmp_path / "model.joblib").write_bytes(bytes((16 << 20) + 1))
     with pytest.raises(UsageError, match=r"model\.joblib is too large, expected at most 16 MB a file"):
-        read_submission(tmp_path, required_parts=asked.parts)
+        read_submission(tmp_path, required_parts=assignment.parts)
 
 
 def test_large_models_that_may_be_submitted_can_be_used(runner: TrialRunner) -> None:

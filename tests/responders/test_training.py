@@ -42,19 +42,19 @@ def train(images, labels):
 @pytest.fixture(scope="module")
 def training() -> Assignment:
     """Return the catalogue's assignment with one trial per scenario and a small budget."""
-    asked = find_assignment("train-a-recogniser")
+    assignment = find_assignment("train-a-recogniser")
     scenarios = tuple(
         replace(scenario, trials=1, light_noise=(0.0,))
-        for scenario in asked.scenarios
+        for scenario in assignment.scenarios
         if scenario.id in ("collected", "unseen")
     )
-    criteria = tuple(criterion for criterion in asked.criteria if criterion.id == "unseen")
-    limits = replace(asked.limits, responder_cpu=1.0, responder_memory_mb=512)
-    return replace(asked, scenarios=scenarios, criteria=criteria, limits=limits)
+    criteria = tuple(criterion for criterion in assignment.criteria if criterion.id == "unseen")
+    limits = replace(assignment.limits, responder_cpu=1.0, responder_memory_mb=512)
+    return replace(assignment, scenarios=scenarios, criteria=criteria, limits=limits)
 
 
-def trained(runner: TrialRunner, asked: Assignment, text: str) -> Grade:
-    return grade(Submission("s", None, SourceFile("responder.py", text)), asked, runner=runner)
+def trained(runner: TrialRunner, assignment: Assignment, text: str) -> Grade:
+    return grade(Submission("s", None, SourceFile("responder.py", text)), assignment, runner=runner)
 
 
 def test_training_without_images_says_that_there_are_none(runner: TrialRunner, training: Assignment) -> None:
@@ -68,15 +68,15 @@ def test_training_without_images_says_that_there_are_none(runner: TrialRunner, t
 
 
 def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunner) -> None:
-    asked = find_assignment("train-a-recogniser")
-    kept = tuple(replace(each, trials=1) for each in asked.scenarios if each.id != "unseen-with-noise")
-    criteria = tuple(each for each in asked.criteria if each.id in ("practice", "unseen"))
-    result = trained(runner, replace(asked, scenarios=kept, criteria=criteria), NEAREST)
+    assignment = find_assignment("train-a-recogniser")
+    kept = tuple(replace(each, trials=1) for each in assignment.scenarios if each.id != "unseen-with-noise")
+    criteria = tuple(each for each in assignment.criteria if each.id in ("practice", "unseen"))
+    result = trained(runner, replace(assignment, scenarios=kept, criteria=criteria), NEAREST)
     assert result.recognition is not None
     assert (result.recognition.id, result.accuracy) == ("unseen", result.criteria[1].accuracy)
-    shown = build_student_view(result).grade
-    assert shown.recognition is not None
-    assert (shown.recognition.id, "for practice (not marked)" in describe_accuracy(shown)) == ("practice", True)
+    view = build_student_view(result).grade
+    assert view.recognition is not None
+    assert (view.recognition.id, "for practice (not marked)" in describe_accuracy(view)) == ("practice", True)
     assert "practice" not in describe_accuracy(result)
 
 
@@ -126,9 +126,9 @@ def test_what_goes_wrong_in_training_is_told(
     runner: TrialRunner, training: Assignment, text: str, verdict: Verdict, sentence: str
 ) -> None:
     result = trained(runner, training, text)
-    told = " ".join(found.message for found in result.criteria)
-    assert (result.verdict, result.marks) == (verdict, 0), told
-    assert sentence in told
+    messages = " ".join(each.message for each in result.criteria)
+    assert (result.verdict, result.marks) == (verdict, 0), messages
+    assert sentence in messages
     assert result.trials[0].verdict is Verdict.FINISHED
 
 
@@ -147,8 +147,8 @@ class Model:
         print(sorted(os.listdir(".")), [numpy.load("train.npz")["labels"].size == self.count], sorted(named))
         return ["square"] * len(rows)
 """
-    found = trained(runner, training, text).trials[1].recording.responder_output
-    assert found.splitlines()[0] == "['train.npz'] [True] []"
+    output = trained(runner, training, text).trials[1].recording.responder_output
+    assert output.splitlines()[0] == "['train.npz'] [True] []"
 
 
 def test_unseen_images_do_not_come_in_the_order_of_the_track(runner: TrialRunner, training: Assignment) -> None:
@@ -167,21 +167,21 @@ def test_a_notebook_is_no_function_that_trains(runner: TrialRunner, training: As
 
 
 def collected(runner: TrialRunner, name: str) -> Recording:
-    asked = find_assignment("collect-shapes")
-    submission = read_submission(locate_examples("collect-shapes") / name, required_parts=asked.parts)
-    return grade(submission, asked, runner=runner).trials[0].recording
+    assignment = find_assignment("collect-shapes")
+    submission = read_submission(locate_examples("collect-shapes") / name, required_parts=assignment.parts)
+    return grade(submission, assignment, runner=runner).trials[0].recording
 
 
 def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     recording = collected(runner, "reference")
-    found = collect_pairs(recording, "log")
-    assert len(found) * 2 == len(recording.image_log)
+    pairs = collect_pairs(recording, "log")
+    assert len(pairs) * 2 == len(recording.image_log)
     assert collect_pairs(recording, "sent") == []
-    usable = Counter(pair.label for pair in found if pair.label is not None)
+    usable = Counter(pair.label for pair in pairs if pair.label is not None)
     assert len(usable) == 6
     # A patch that can be decoded is correct, or the sensor is beside the shape.
-    assert all(pair.truth in (None, pair.decoded) for pair in found if pair.decoded is not None)
-    assert sum(usable.values()) < len(found)
+    assert all(pair.truth in (None, pair.decoded) for pair in pairs if pair.decoded is not None)
+    assert sum(usable.values()) < len(pairs)
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     [({}, 4), ({"each": 4}, 4), ({"each": 50}, 0), ({"classes": ("square",)}, 4), ({"most_duplicates": 0.0}, 0)],
 )
 def test_what_is_asked_of_training_data(runner: TrialRunner, changes: dict[str, Any], marks: int) -> None:
-    asked = find_assignment("collect-shapes")
-    criterion = asked.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
-    submission = read_submission(locate_examples("collect-shapes") / "reference", required_parts=asked.parts)
-    assert grade(submission, replace(asked, criteria=(criterion,)), runner=runner).marks == marks
+    assignment = find_assignment("collect-shapes")
+    criterion = assignment.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
+    submission = read_submission(locate_examples("collect-shapes") / "reference", required_parts=assignment.parts)
+    assert grade(submission, replace(assignment, criteria=(criterion,)), runner=runner).marks == marks

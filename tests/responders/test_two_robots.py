@@ -75,7 +75,7 @@ def test_a_text_is_heard_by_the_other_robot_as_late_as_the_channel_says(runner: 
 
 
 @pytest.mark.parametrize(
-    ("said", "heard"),
+    ("sent_text", "heard"),
     [
         ("PY::3", "'3'"),
         ("PY::JSON::[1, 2.0]", "[1, 2]"),
@@ -84,9 +84,9 @@ def test_a_text_is_heard_by_the_other_robot_as_late_as_the_channel_says(runner: 
         ("PY::\\u00e4 \\\\ '\\n", '"ä \\\\ \'\\n"'),
     ],
 )
-def test_what_is_heard(runner: TrialRunner, said: str, heard: str) -> None:
+def test_what_is_heard(runner: TrialRunner, sent_text: str, heard: str) -> None:
     listen = GLUE + WAIT + "print(repr(glue.pyState()['messages'][0]))\n"
-    _, listener = run_both(runner, f'print("""{said}""")', listen, seconds=2)
+    _, listener = run_both(runner, f'print("""{sent_text}""")', listen, seconds=2)
     assert printed(listener) == [heard]
 
 
@@ -155,9 +155,9 @@ def test_an_obstacle_between_robots_blocks(runner: TrialRunner) -> None:
 
 
 def test_what_the_channel_corrupts_is_heard_so_and_is_no_fault(runner: TrialRunner) -> None:
-    said = "print('PY::JSON::[true]')\nprint('PY::abc')"
+    program_text = "print('PY::JSON::[true]')\nprint('PY::abc')"
     first, second = run_both(
-        runner, said, GLUE + "time.sleep(1)\nprint(glue.pyState())", channel=Channel(corruption=1.0)
+        runner, program_text, GLUE + "time.sleep(1)\nprint(glue.pyState())", channel=Channel(corruption=1.0)
     )
     assert first.faults == second.faults == ()
     assert all(message.arrived_as not in (None, message.text) for message in (*first.messages, *second.messages))
@@ -182,14 +182,14 @@ def test_a_responder_hears_both_in_the_order_in_which_they_spoke(runner: TrialRu
     speak = "import time\nfor i in range(20):\n    time.sleep({})\n    print('PY::', {})\n"
     responder = "said = []\ndef responder(text):\n    said.append(text)\n    return str(len(said))"
     first, second = run_both(runner, speak.format(0.013, 1), speak.format(0.007, 2), responder=responder)
-    said = [
+    robot_messages = [
         (message.t, robot, int(answer.text))
         for robot, each in ((1, first), (2, second))
         for message, answer in pairwise(sorted(each.messages, key=lambda m: (m.t, m.sender == "responder")))
         if message.sender == "robot" and answer.sender == "responder"
     ]
-    assert len(said) == 40
-    assert [number for _, _, number in sorted(said)] == list(range(1, 41))
+    assert len(robot_messages) == 40
+    assert [number for _, _, number in sorted(robot_messages)] == list(range(1, 41))
 
 
 def test_what_a_responder_calls_is_told_with_the_robot_that_asked(runner: TrialRunner) -> None:
@@ -262,9 +262,9 @@ def test_when_both_go_wrong_both_are_told_and_the_earliest_counts(runner: TrialR
     both = run_both(runner, first, second, seconds=5, program_limits=SHORT)
     for text, recording in zip((first, second), both, strict=True):
         assert recording.verdict in VERDICTS[text]
-    told = collect_faults(both[0])
-    assert [fault.t for fault in told] == sorted(fault.t for fault in told)
-    assert decide_verdict(both[0]) is told[0].verdict
+    faults = collect_faults(both[0])
+    assert [fault.t for fault in faults] == sorted(fault.t for fault in faults)
+    assert decide_verdict(both[0]) is faults[0].verdict
 
 
 def test_two_that_wait_for_each_other_for_ever_end_when_the_time_is_up(runner: TrialRunner) -> None:

@@ -51,14 +51,14 @@ def test_every_exported_name_is_documented() -> None:
 @pytest.mark.long
 def test_every_documented_script_runs(folder: Path) -> None:
     assert len(SCRIPTS) == 3
-    told = ""
+    output = ""
     for script in SCRIPTS:
         done = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        told += done.stdout
-    assert "reference 10.00 of 10" in told
-    assert "finished Pose(" in told
-    assert "PY::hello" in told
+        output += done.stdout
+    assert "reference 10.00 of 10" in output
+    assert "finished Pose(" in output
+    assert "PY::hello" in output
     for name in ("reference", "flawed"):
         assert "echo" in (folder / f"{name}.html").read_text().lower()
 
@@ -66,10 +66,10 @@ def test_every_documented_script_runs(folder: Path) -> None:
 def test_it_grades_as_the_command_does(folder: Path) -> None:
     assignment = robomark.load_assignment("echo-responder")
     grade = robomark.grade(robomark.load_submission(folder / "my-work" / "flawed", assignment), assignment)
-    shown = command("grade", folder / "my-work" / "flawed", "-a", "echo-responder", "--format", "json")
-    told = json.loads(shown.stdout)
-    assert float(grade.marks) == told["marks"]
-    assert [trial.recording.sha256 for trial in grade.trials] == [trial["sha256"] for trial in told["trials"]]
+    result = command("grade", folder / "my-work" / "flawed", "-a", "echo-responder", "--format", "json")
+    document = json.loads(result.stdout)
+    assert float(grade.marks) == document["marks"]
+    assert [trial.recording.sha256 for trial in grade.trials] == [trial["sha256"] for trial in document["trials"]]
 
 
 def test_a_replay_is_read_from_its_page_and_from_its_data(folder: Path) -> None:

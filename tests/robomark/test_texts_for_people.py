@@ -101,14 +101,14 @@ def _product_files() -> list[Path]:
 
 
 def test_no_code_reads_texts_for_people() -> None:
-    found = Counter[str]()
+    uses = Counter[str]()
     lines: dict[str, list[int]] = {}
     for file in _product_files():
         if places := _places(file.read_text(encoding="utf-8")):
             name = file.relative_to(_ROOT).as_posix()
-            found[name], lines[name] = len(places), places
+            uses[name], lines[name] = len(places), places
     allowed = {name: count for name, (count, _) in _ALLOWED.items()}
-    differing = {name: lines.get(name, []) for name in found | allowed if found[name] != allowed.get(name, 0)}
+    differing = {name: lines.get(name, []) for name in uses | allowed if uses[name] != allowed.get(name, 0)}
     assert not differing, "give the error, fault or row a code or a value; or correct the count in the table"
 
 

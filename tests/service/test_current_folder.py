@@ -139,6 +139,6 @@ STARTS = re.compile(
 def test_one_function_starts_processes() -> None:
     packages = ("sim", "models", "responders", "submissions", "service")
     files = [path for package in packages for path in (ROOT / package).rglob("*.py") if "catalogue" not in path.parts]
-    found = {str(path.relative_to(ROOT)) for path in files if STARTS.search(path.read_text())}
-    inside = {name for name in found if name.startswith("responders/sandbox/inside/")}
-    assert found - inside <= STARTERS
+    document = {str(path.relative_to(ROOT)) for path in files if STARTS.search(path.read_text())}
+    inside = {name for name in document if name.startswith("responders/sandbox/inside/")}
+    assert document - inside <= STARTERS

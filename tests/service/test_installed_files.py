@@ -27,8 +27,8 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: robomark\nVersion: 1\n")
     (info / "RECORD").write_text("\n".join([*lines, "robomark-1.dist-info/RECORD,,", ""]))
-    found = metadata.PathDistribution(info)
-    monkeypatch.setattr("importlib.metadata.files", lambda _name: found.files)
+    distribution = metadata.PathDistribution(info)
+    monkeypatch.setattr("importlib.metadata.files", lambda _name: distribution.files)
     return tmp_path
 
 

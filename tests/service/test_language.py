@@ -18,9 +18,11 @@ _PLACES = re.compile(r"%\(\w+\)[sd]|<[^>]+>")
 @pytest.mark.parametrize("code", OTHERS)
 def test_a_catalogue_has_all_that_pages_say(code: str) -> None:
     catalogue = update_catalogue(code)
-    said = {str(message.id) for message in extract_messages() if message.id}
+    message_ids = {str(message.id) for message in extract_messages() if message.id}
     kept = {str(message.id): message.string for message in catalogue if message.id}
-    assert said == set(kept), f"python -m service.message_catalogue brings {locate_catalogue(code).name} up to date"
+    assert message_ids == set(kept), (
+        f"python -m service.message_catalogue brings {locate_catalogue(code).name} up to date"
+    )
     missing = [text for text, translated in kept.items() if not translated or not all(translated)]
     assert missing == []
     for message in catalogue:

@@ -92,8 +92,8 @@ def test_a_student_watches_an_earlier_attempt_in_a_report_and_in_a_replay(store:
         with pytest.raises(UsageError, match="comes before"):
             batches.find_previous_job(session, before.id)
         grade = results.load_grade(session, line.id)
-    told = replay_over(store, line, before, tmp_path)
-    assert (told["name"], told["parted"]) == ("attempt 1", pytest.approx(94 / 30))
+    overlay = replay_over(store, line, before, tmp_path)
+    assert (overlay["name"], overlay["parted"]) == ("attempt 1", pytest.approx(94 / 30))
     report = write_report(store, line, grade, tmp_path, "ada", before)
     assert [trial["over"]["name"] for trial in data_of(report.path.read_text())["trials"]] == ["attempt 1"] * 2
     plain = write_report(store, line, grade, tmp_path, "ada")

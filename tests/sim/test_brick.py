@@ -127,14 +127,14 @@ def test_every_clock_agrees_with_those_of_python(runner: TrialRunner) -> None:
         "print([time.clock_gettime(each) for each in (1, 2, 3, 4, 7)], time.clock_gettime_ns(1))\n"
         "print(os.times().elapsed, timeit.default_timer())"
     )
-    said = [line.text for line in run_program(runner, program).printed]
-    assert said == ["[0.0, 0.0, 0.0]", "0", "[1.5, 1.5, 1.5, 1.5, 1.5] 1500000000", "1.5 1.5"]
+    page_text = [line.text for line in run_program(runner, program).printed]
+    assert page_text == ["[0.0, 0.0, 0.0]", "0", "[1.5, 1.5, 1.5, 1.5, 1.5] 1500000000", "1.5 1.5"]
 
 
 def test_generators_without_a_seed_draw_from_that_of_the_trial(runner: TrialRunner) -> None:
     program = "import random\nprint(random.Random().random(), random.seed(), random.random())"
-    said = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
-    assert said[0] == said[1] != said[2]
+    page_text = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
+    assert page_text[0] == page_text[1] != page_text[2]
 
 
 @pytest.mark.parametrize("attempt", ["open('/dev/urandom', 'rb')", "os.getrandom(8)"])
@@ -146,8 +146,8 @@ def test_chance_comes_from_the_seed(runner: TrialRunner) -> None:
     program = (
         "import random, uuid, secrets, os\nprint(random.random(), uuid.uuid4(), secrets.token_hex(4), os.urandom(4))"
     )
-    said = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
-    assert said[0] == said[1] != said[2]
+    page_text = [run_program(runner, program, seed=seed).printed[0].text for seed in (1, 1, 2)]
+    assert page_text[0] == page_text[1] != page_text[2]
 
 
 def test_nothing_leaks_from_one_run_into_the_next(runner: TrialRunner) -> None:

@@ -56,7 +56,7 @@ def graded(folder: Path, sheet: str, runner: TrialRunner, labels: str = "false")
     return grade(LOOK, assignment(folder, sheet, labels), runner=runner)
 
 
-def shown(image: Image) -> bytes:
+def extract_pixels(image: Image) -> bytes:
     """Return the 14 x 14 grey levels in the middle of the left sensor's image."""
     rgba = np.frombuffer(image.left, np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 4)
     return rgba[3:17, 3:17, 0].tobytes()
@@ -70,17 +70,17 @@ def on_sheet(seed: int) -> bytes:
 @pytest.mark.parametrize(("sheet", "seed"), [('"fixed"', 0), ("7", 7)])
 def test_every_trial_has_the_same_sheet(tmp_path: Path, runner: TrialRunner, sheet: str, seed: int) -> None:
     images = [trial.recording.images[0] for trial in graded(tmp_path, sheet, runner).trials]
-    assert {shown(image) for image in images} == {on_sheet(seed)}
+    assert {extract_pixels(image) for image in images} == {on_sheet(seed)}
 
 
 def test_every_trial_has_a_sheet_of_its_own_and_the_truth_follows(tmp_path: Path, runner: TrialRunner) -> None:
     result = graded(tmp_path, '"per-seed"', runner)
     for trial in result.trials:
         image = trial.recording.images[0]
-        assert shown(image) == on_sheet(trial.seed)
+        assert extract_pixels(image) == on_sheet(trial.seed)
         ground = build_floor("MNIST_Digits", seed=trial.seed)
         assert image.truth == ground.find_label(380, 80)
-    assert len({shown(trial.recording.images[0]) for trial in result.trials}) == 2
+    assert len({extract_pixels(trial.recording.images[0]) for trial in result.trials}) == 2
     assert result.accuracy is not None
     assert result.accuracy.labels == list_label_names("MNIST_Digits") == tuple("0123456789")
 
@@ -106,8 +106,8 @@ def test_a_report_draws_the_sheet_that_lay_there_with_its_patches_or_without(
 def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(
     tmp_path: Path, runner: TrialRunner
 ) -> None:
-    asked = assignment(tmp_path, '"per-seed"')
-    asked = replace(asked, parts=replace(asked.parts, responder="student"))
+    graded_assignment = assignment(tmp_path, '"per-seed"')
+    graded_assignment = replace(graded_assignment, parts=replace(graded_assignment.parts, responder="student"))
     cells = [
         "def responder(text):\n    return seen",
         '%%sim_magic_preloaded -R -b MNIST_Digits -x 400 -y 50 -a 90\nprint("image_data left")',
@@ -115,12 +115,14 @@ def test_a_notebook_cannot_read_the_answers_off_the_marked_sheet_beforehand(
         '%%sim_magic_preloaded -R\nimport time\nprint("IMG_DATA")\ntime.sleep(1)',
     ]
     result = grade(
-        read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=asked.parts), asked, runner=runner
+        read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=graded_assignment.parts),
+        graded_assignment,
+        runner=runner,
     )
     for trial in result.trials:
         (answer,) = (message.text for message in trial.recording.messages if message.sender == "responder")
         pixels = np.array(answer.split(","), np.uint8).reshape(SENSOR_SIDE, SENSOR_SIDE, 3)
-        assert pixels[3:17, 3:17, 0].tobytes() == on_sheet(0) != shown(trial.recording.images[0])
+        assert pixels[3:17, 3:17, 0].tobytes() == on_sheet(0) != extract_pixels(trial.recording.images[0])
 
 
 @pytest.mark.parametrize("sheet", ["-1", "true", '"new"', "1.5", "[]"])

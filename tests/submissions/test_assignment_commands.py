@@ -116,8 +116,13 @@ def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_p
     file.write_text(file.read_text() + own)
     (tmp_path / "task" / "check.py").write_text("def check(trial): return trial['printed'][99] == 'done'\n")
     problems = check_examples(str(tmp_path / "task"), runner=runner).problems
-    said = "own could not be judged: The assignment's own check fails: check.py: IndexError: list index out of range"
-    assert [problem.partition(" (")[0] for problem in problems] == [f"reference: {said}", f"stops-short: {said}"]
+    expected_problem = (
+        "own could not be judged: The assignment's own check fails: check.py: IndexError: list index out of range"
+    )
+    assert [problem.partition(" (")[0] for problem in problems] == [
+        f"reference: {expected_problem}",
+        f"stops-short: {expected_problem}",
+    ]
     failed = robomark("assignments", "check", str(tmp_path / "task"))
     assert failed.returncode == 2
     assert "own could not be judged" in failed.stdout + failed.stderr
@@ -219,7 +224,7 @@ def test_marks_that_are_wrong_are_not_noted(tmp_path: Path, runner: TrialRunner)
 
 def test_a_list_says_what_the_assignments_say() -> None:
     for name in list_catalogue_ids():
-        found, listed = find_assignment(name), read_overview(locate_assignment_folder(name))
-        assert (listed.section, listed.id, listed.title) == (found.section, found.id, found.title)
-        assert listed.sentence.removesuffix(" …") in " ".join(found.description.split())
-        assert (listed.marks, listed.trials) == (found.max_marks, sum(1 for _ in found.trials())), name
+        assignment, listed = find_assignment(name), read_overview(locate_assignment_folder(name))
+        assert (listed.section, listed.id, listed.title) == (assignment.section, assignment.id, assignment.title)
+        assert listed.sentence.removesuffix(" …") in " ".join(assignment.description.split())
+        assert (listed.marks, listed.trials) == (assignment.max_marks, sum(1 for _ in assignment.trials())), name

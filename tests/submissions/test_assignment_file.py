@@ -62,10 +62,10 @@ def test_catalogue_is_in_order(name: str) -> None:
     assert assignment.max_marks > 0
     assert assignment.description
     assert re.fullmatch("[0-9a-f]{64}", assignment.version)
-    asked = {"robot.py": assignment.parts.program, "responder.py": assignment.parts.responder}
-    asked["robot2.py"] = assignment.parts.second_program
+    part_texts = {"robot.py": assignment.parts.program, "responder.py": assignment.parts.responder}
+    part_texts["robot2.py"] = assignment.parts.second_program
     starter = {path.name for path in (locate_assignment_folder(name) / "starter").iterdir()}
-    assert {part for part, who in asked.items() if who == "student"} <= starter or starter == {"notebook.ipynb"}
+    assert {part for part, who in part_texts.items() if who == "student"} <= starter or starter == {"notebook.ipynb"}
 
 
 def test_shape_recognition_covers_the_six_shapes_and_gives_the_network() -> None:
@@ -207,9 +207,9 @@ title = "x"
 marks = 1.005
 check = "pose"
 """
-    found = problems(tmp_path / "bad", text)
+    messages = problems(tmp_path / "bad", text)
     by_line: dict[int, list[str]] = {}
-    for problem in found:
+    for problem in messages:
         line, _, sentence = problem.removeprefix("bad/assignment.toml:").partition(": ")
         by_line.setdefault(int(line), []).append(sentence)
     expected = {
@@ -234,7 +234,7 @@ check = "pose"
         46: "marks is 1.005, expected at most two decimal places",
     }
     for number, phrase in expected.items():
-        assert any(phrase in sentence for sentence in by_line.get(number, [])), (number, found)
+        assert any(phrase in sentence for sentence in by_line.get(number, [])), (number, messages)
     assert set(by_line) == set(expected)
 
 
@@ -336,21 +336,21 @@ check = "pose"
     ],
 )
 def test_mistake_is_named_with_its_line(tmp_path: Path, text: str, line: int, phrase: str) -> None:
-    found = problems(tmp_path / "bad", text)
-    assert any(p.startswith(f"bad/assignment.toml:{line}: ") and phrase in p for p in found), found
+    messages = problems(tmp_path / "bad", text)
+    assert any(p.startswith(f"bad/assignment.toml:{line}: ") and phrase in p for p in messages), messages
 
 
 @pytest.mark.parametrize("check", ["says", "prints", "messages"])
 def test_criterion_that_asks_for_nothing_is_refused(tmp_path: Path, check: str) -> None:
-    found = problems(tmp_path / "bad", HEAD + SCENARIO + FINISHES.replace("finishes", check))
-    assert "has no condition" in found[0]
+    messages = problems(tmp_path / "bad", HEAD + SCENARIO + FINISHES.replace("finishes", check))
+    assert "has no condition" in messages[0]
 
 
 @pytest.mark.parametrize("poses", ["[1, 2, 3]", '[["a", 2, 3]]', "[[1, 2]]", "[[nan, 2, 3]]"])
 def test_a_list_of_wrong_poses_is_not_called_too_short_as_well(tmp_path: Path, poses: str) -> None:
-    found = problems(tmp_path / "bad", HEAD + f'[[scenario]]\nid = "s"\nposes = {poses}\n' + FINISHES)
-    assert not any("too few entries" in sentence for sentence in found)
-    assert all(sentence.startswith("bad/assignment.toml:5: poses") for sentence in found), found
+    messages = problems(tmp_path / "bad", HEAD + f'[[scenario]]\nid = "s"\nposes = {poses}\n' + FINISHES)
+    assert not any("too few entries" in sentence for sentence in messages)
+    assert all(sentence.startswith("bad/assignment.toml:5: poses") for sentence in messages), messages
 
 
 def test_what_is_no_assignment_is_refused(tmp_path: Path) -> None:
@@ -390,8 +390,8 @@ def test_a_pose_is_accepted_exactly_when_it_is_on_the_floor(x: float, y: float) 
         "scenario": [{"id": "s", "poses": [[x, y, 0]]}],
         "criterion": [{"title": "t", "marks": 1, "check": "finishes"}],
     }
-    found = Problems("f", {})
-    assert (build_assignment(document, {}, found) is not None) == (0 <= x <= WIDTH and 0 <= y <= HEIGHT)
+    problem_list = Problems("f", {})
+    assert (build_assignment(document, {}, problem_list) is not None) == (0 <= x <= WIDTH and 0 <= y <= HEIGHT)
 
 
 def test_lines_of_keys_are_found_in_every_way_of_writing_them() -> None:
@@ -487,5 +487,5 @@ VALUES = st.recursive(
 
 @given(st.dictionaries(KEYS, VALUES, max_size=8))
 def test_whatever_a_file_says_the_answer_is_an_assignment_or_sentences(document: dict[str, object]) -> None:
-    found = Problems("f", {})
-    assert build_assignment(document, {}, found) is not None or found.sorted()
+    problem_list = Problems("f", {})
+    assert build_assignment(document, {}, problem_list) is not None or problem_list.sorted()

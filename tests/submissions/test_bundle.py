@@ -47,9 +47,9 @@ def folder(path: Path, files: Mapping[str, str | bytes]) -> Path:
     return path
 
 
-def refusal(path: Path, asked: Parts | None = None) -> str:
+def refusal(path: Path, required_parts: Parts | None = None) -> str:
     with pytest.raises(UsageError) as error:
-        read_submission(path, required_parts=asked)
+        read_submission(path, required_parts=required_parts)
     sentence = str(error.value)
     assert "\n" not in sentence
     assert sentence.startswith(path.name)
@@ -139,8 +139,8 @@ def test_one_missing_part_of_two_is_named_and_the_other_taken(tmp_path: Path) ->
 
 def test_without_any_part_that_is_asked_for_it_is_refused(tmp_path: Path) -> None:
     path = folder(tmp_path / "bob", {"robot.py": PROGRAM})
-    assert "has no responder.py" in refusal(path, asked=Parts("robot.py", "student"))
-    assert "has no robot.py or responder.py" in refusal(folder(tmp_path / "eve", {"a.txt": ""}), asked=Parts())
+    assert "has no responder.py" in refusal(path, required_parts=Parts("robot.py", "student"))
+    assert "has no robot.py or responder.py" in refusal(folder(tmp_path / "eve", {"a.txt": ""}), required_parts=Parts())
 
 
 def test_part_that_the_assignment_gives_is_left_out_with_a_note() -> None:

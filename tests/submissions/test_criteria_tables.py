@@ -56,9 +56,9 @@ AREA = {"rectangle": [0, 0, 10, 10]}
 def test_a_mistake_is_named_where_it_is(
     check: str, keys: dict[str, Any], place: tuple[str | int, ...], sentence: str
 ) -> None:
-    found = read_table(SCHEMAS[check], {"title": "A", "marks": 1, "check": check, **keys})
-    assert isinstance(found, list)
-    (problem,) = found
+    criterion = read_table(SCHEMAS[check], {"title": "A", "marks": 1, "check": check, **keys})
+    assert isinstance(criterion, list)
+    (problem,) = criterion
     assert problem.path == place
     assert sentence in problem.sentence
 

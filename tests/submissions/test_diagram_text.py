@@ -18,7 +18,7 @@ from submissions.notebook import read_notebook
 from submissions.submission import Cell, Notebook
 
 
-def told(diagram: Diagram) -> list[str]:
+def list_texts(diagram: Diagram) -> list[str]:
     """Return the steps, one per line."""
     return [
         f"--- {step.text}"
@@ -64,7 +64,7 @@ def refusal(kind: DiagramKind, text: str) -> str:
     ],
 )
 def test_steps(kind: DiagramKind, text: str, steps: list[str]) -> None:
-    assert told(read_diagram(kind, text)) == steps
+    assert list_texts(read_diagram(kind, text)) == steps
 
 
 def test_actors_have_what_was_said_of_them_wherever_it_was() -> None:
@@ -169,9 +169,9 @@ def test_any_text_is_a_diagram_within_the_limits_or_one_sentence(kind: DiagramKi
     try:
         diagram = read_diagram(kind, text)
     except UsageError as error:
-        said = re.fullmatch(r"line ([1-9]\d*): [^\n]+", str(error))
-        assert said
-        assert int(said[1]) <= text.count("\n") + 1
+        match = re.fullmatch(r"line ([1-9]\d*): [^\n]+", str(error))
+        assert match
+        assert int(match[1]) <= text.count("\n") + 1
         return
     names = {actor.name for actor in diagram.actors}
     assert 1 <= len(names) == len(diagram.actors) <= MAX_ACTORS
@@ -211,9 +211,13 @@ def written(diagram: Diagram) -> str:
             lines.append(f"{signs} {step.text} {signs}")
             continue
         sign = "-->" if step.line == "dashed" else "->"
-        said = [f"label = {quoted(step.label)}", f"note = {quoted(step.note)}", *(["failed"] if step.failed else [])]
-        said += [f"color = {quoted(step.colour)}"] if step.colour else []
-        lines.append(f"{quoted(step.source)} {sign} {quoted(step.target)} [{', '.join(said)}];")
+        attributes = [
+            f"label = {quoted(step.label)}",
+            f"note = {quoted(step.note)}",
+            *(["failed"] if step.failed else []),
+        ]
+        attributes += [f"color = {quoted(step.colour)}"] if step.colour else []
+        lines.append(f"{quoted(step.source)} {sign} {quoted(step.target)} [{', '.join(attributes)}];")
     return "\n".join(["seqdiag {", *lines, "}"])
 
 
@@ -223,18 +227,18 @@ def test_a_diagram_that_is_written_down_is_read_again(diagram: Diagram) -> None:
 
 
 def test_the_course_notebook_draws_four() -> None:
-    found = read_diagrams(read_notebook(MESSAGING.read_bytes(), "messaging.ipynb").notebook)
-    assert found.problems == ()
-    assert [(cell.cell, cell.diagram.kind) for cell in found.cells] == [
+    notebook_diagrams = read_diagrams(read_notebook(MESSAGING.read_bytes(), "messaging.ipynb").notebook)
+    assert notebook_diagrams.problems == ()
+    assert [(cell.cell, cell.diagram.kind) for cell in notebook_diagrams.cells] == [
         (2, "blockdiag"),
         (7, "seqdiag"),
         (15, "seqdiag"),
         (27, "seqdiag"),
     ]
-    blocks, *_, last = (cell.diagram for cell in found.cells)
+    blocks, *_, last = (cell.diagram for cell in notebook_diagrams.cells)
     assert [actor.label for actor in blocks.actors] == ["Robot", "Python message\nhandler", "Neural network"]
     assert {arrow.heads for arrow in blocks.arrows} == {"both"}
-    assert told(last) == [
+    assert list_texts(last) == [
         "robot > responder: IMG_DATA::data",
         "responder > agent: message",
         "agent > parser: message",
@@ -250,11 +254,11 @@ def test_the_course_notebook_draws_four() -> None:
 def test_a_problem_names_the_cell_and_the_line_in_it() -> None:
     sources = ["x = 1", "# first\n\n%%seqdiag --size 3\na -> b\na @ b", "%%blockdiag\na -> b", "%%seqdiagram\nx"]
     cells = tuple(Cell(number, source) for number, source in enumerate(sources, 1))
-    found = read_diagrams(Notebook("n.ipynb", cells))
-    assert [cell.cell for cell in found.cells] == [3]
-    assert len(found.problems) == 1
-    assert found.problems[0].startswith("cell 2, line 5: '@' is not valid here")
-    assert found.problems[0].endswith("; the diagram is not drawn")
+    notebook_diagrams = read_diagrams(Notebook("n.ipynb", cells))
+    assert [cell.cell for cell in notebook_diagrams.cells] == [3]
+    assert len(notebook_diagrams.problems) == 1
+    assert notebook_diagrams.problems[0].startswith("cell 2, line 5: '@' is not valid here")
+    assert notebook_diagrams.problems[0].endswith("; the diagram is not drawn")
     assert read_diagrams(None).cells == ()
 
 
@@ -262,15 +266,19 @@ def test_diagrams_are_left_out_that_would_take_too_long_together() -> None:
     steps = "\n".join(f'a -> b [label="{"long " * 20}", note="{"note " * 20}"];' for _ in range(78))
     sources = [f"%%seqdiag\n{steps}"] * 20
     sources.insert(5, "%%seqdiag\na -> b")
-    found = read_diagrams(Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1))))
-    assert 80 <= sum(cell.diagram.parts for cell in found.cells) <= MAX_PARTS
-    assert [cell.cell for cell in found.cells] == [1, 6]
-    assert len(found.problems) == MAX_DIAGRAMS - 2 + 1
-    assert all("not drawn" in problem or "are drawn" in problem for problem in found.problems)
+    notebook_diagrams = read_diagrams(
+        Notebook("n.ipynb", tuple(Cell(number, text) for number, text in enumerate(sources, 1)))
+    )
+    assert 80 <= sum(cell.diagram.parts for cell in notebook_diagrams.cells) <= MAX_PARTS
+    assert [cell.cell for cell in notebook_diagrams.cells] == [1, 6]
+    assert len(notebook_diagrams.problems) == MAX_DIAGRAMS - 2 + 1
+    assert all("not drawn" in problem or "are drawn" in problem for problem in notebook_diagrams.problems)
 
 
 def test_of_very_many_diagrams_the_first_are_read() -> None:
     cells = tuple(Cell(number, "%%seqdiag\na -> b") for number in range(1, 200))
-    found = read_diagrams(Notebook("n.ipynb", cells))
-    assert len(found.cells) == MAX_DIAGRAMS
-    assert found.problems == (f"cell {MAX_DIAGRAMS + 1}: of all diagrams only the first {MAX_DIAGRAMS} are drawn",)
+    notebook_diagrams = read_diagrams(Notebook("n.ipynb", cells))
+    assert len(notebook_diagrams.cells) == MAX_DIAGRAMS
+    assert notebook_diagrams.problems == (
+        f"cell {MAX_DIAGRAMS + 1}: of all diagrams only the first {MAX_DIAGRAMS} are drawn",
+    )

@@ -245,8 +245,8 @@ def test_nbgraders_folder_goes_by_student_and_assignment(tmp_path: Path) -> None
     }
     folder = laid(tmp_path, files) / "submitted"
     each = read_named_batch(folder, None)
-    found = {(request.submission.student, request.assignment.id) for request in each.grading_requests}
-    assert found == {("s1", "echo-responder"), ("s2", "echo-responder"), ("s1", "json-queue")}
+    pairs = {(request.submission.student, request.assignment.id) for request in each.grading_requests}
+    assert pairs == {("s1", "echo-responder"), ("s2", "echo-responder"), ("s1", "json-queue")}
     assert list(refused(each)) == ["s3"]
     first, second = read_named_batch(folder, ASSIGNMENT).grading_requests
     assert (str(first.submitted_at), second.submitted_at) == ("2026-11-19 16:03:18+00:00", None)
@@ -260,12 +260,12 @@ def test_a_roster_says_who_everybody_is_in_any_order(tmp_path: Path) -> None:
     folder = laid(tmp_path, {**under("a/"), **under("b/")})
     (folder / "roster.csv").write_text("Email;file;NAME;id\nada@uni.example;a;Ada Lovelace;s1\n;b;;s2\n")
     contents = read_named_batch(folder / "roster.csv", ASSIGNMENT)
-    told = [(each.student.id, each.student.name, each.student.email) for each in contents.grading_requests]
-    assert told == [("s1", "Ada Lovelace", "ada@uni.example"), ("s2", "", "")]
+    students = [(each.student.id, each.student.name, each.student.email) for each in contents.grading_requests]
+    assert students == [("s1", "Ada Lovelace", "ada@uni.example"), ("s2", "", "")]
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "expected_people"),
     [
         ("email,id,name\nada@u,s1,Ada\n", {("s1", "Ada", "ada@u")}),
         ("First name\tLast name\tSID\nAda\tLovelace\t7\n", {("7", "Ada Lovelace", "")}),
@@ -273,9 +273,9 @@ def test_a_roster_says_who_everybody_is_in_any_order(tmp_path: Path) -> None:
         ("\ufeffIdentifier,Full name\nParticipant 5,Ada\n", {("Ada", "Ada", "")}),
     ],
 )  # fmt: skip
-def test_tables_of_people_of_many_makes(tmp_path: Path, text: str, found: set[tuple[str, str, str]]) -> None:
+def test_tables_of_people_of_many_makes(tmp_path: Path, text: str, expected_people: set[tuple[str, str, str]]) -> None:
     listed = {each for several in people(tmp_path, text).by_name.values() for each in several}
-    assert {(each.id, each.name, each.email) for each in listed} == found
+    assert {(each.id, each.name, each.email) for each in listed} == expected_people
 
 
 @pytest.mark.parametrize(

@@ -85,15 +85,15 @@ def grade_example(assignment: str, name: str, runner: TrialRunner) -> Grade:
 
 
 def grade_failing(name: str, runner: TrialRunner) -> Grade:
-    asked = find_assignment("echo-responder")
-    return grade(read_submission(FOLDER / name, required_parts=asked.parts), asked, runner=runner)
+    assignment = find_assignment("echo-responder")
+    return grade(read_submission(FOLDER / name, required_parts=assignment.parts), assignment, runner=runner)
 
 
 def assert_as_expected(result: Grade, wanted: ExpectedResult) -> None:
-    told = "\n".join(criterion.message for criterion in result.criteria)
-    assert (str(result.verdict), result.marks) == (wanted.verdict, wanted.marks), told
+    messages = "\n".join(criterion.message for criterion in result.criteria)
+    assert (str(result.verdict), result.marks) == (wanted.verdict, wanted.marks), messages
     for phrase in wanted.feedback:
-        assert phrase in told
+        assert phrase in messages
 
 
 def rules_that_prove() -> Iterator[Rule]:
@@ -170,10 +170,10 @@ def test_every_failing_submission_has_an_expectation() -> None:
 
 @pytest.mark.long
 def test_what_the_database_keeps_is_graded_alike(runner: TrialRunner) -> None:
-    asked = find_assignment("shape-at-random")
-    submission = read_example(asked.id, "flawed")
+    assignment = find_assignment("shape-at-random")
+    submission = read_example(assignment.id, "flawed")
     kept = unpack_submission(pack_submission(submission))
-    first, second = grade(submission, asked, runner=runner), grade(kept, asked, runner=runner)
+    first, second = grade(submission, assignment, runner=runner), grade(kept, assignment, runner=runner)
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
     assert (first.submission, first.criteria) == (second.submission, second.criteria)
 
@@ -200,8 +200,8 @@ def test_seed_names_all_six_shapes_and_says_so(runner: TrialRunner) -> None:
     result = grade_example("shape-recognition", "seed", runner)
     assert result.accuracy is not None
     assert (result.accuracy.value, result.accuracy.n) == (1.0, 6)
-    said = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}
-    assert said[520, 900] == "Is that a upwards facing triangle"
+    page_text = {(t.recording.start.x, t.recording.start.y): t.recording.spoken[-1].text for t in result.trials}
+    assert page_text[520, 900] == "Is that a upwards facing triangle"
 
 
 def sought(criterion: Criterion) -> bool:
@@ -218,7 +218,7 @@ def sought(criterion: Criterion) -> bool:
 
 @pytest.mark.parametrize("assignment", list_catalogue_ids())
 def test_naming_everything_earns_less_than_a_third_of_each_criterion_that_looks_among_much(assignment: str) -> None:
-    asked = [criterion for criterion in find_assignment(assignment).criteria if sought(criterion)]
-    if asked:
+    graded_assignment = [criterion for criterion in find_assignment(assignment).criteria if sought(criterion)]
+    if graded_assignment:
         earned = read_expected(assignment).examples["spray-and-pray"].earns
-        assert [each.id for each in asked if 3 * earned[each.id] >= each.marks] == []
+        assert [each.id for each in graded_assignment if 3 * earned[each.id] >= each.marks] == []

@@ -194,8 +194,8 @@ def test_no_archive_of_any_making_raises_anything_else(
     for place, new in damage:
         at = place % len(data)
         data[at : at + len(new)] = new
-    found, refusal = _unzipped(bytes(data))
-    assert (found is None) == refusal.startswith("x.zip: ")
+    unzipped_files, refusal = _unzipped(bytes(data))
+    assert (unzipped_files is None) == refusal.startswith("x.zip: ")
 
 
 def _unzipped(data: bytes) -> tuple[dict[str, bytes] | None, str]:

@@ -124,16 +124,16 @@ def test_trials_are_counted_as_they_are_made(
         motor_noise=motor,
         sweep=sweep,
     )
-    found = Assignment("a", "A", WorldSpec("Empty_Map"), Parts(), (scenario, scenario), ())
-    assert found.trial_count == len(list(found.trials()))
+    assignment = Assignment("a", "A", WorldSpec("Empty_Map"), Parts(), (scenario, scenario), ())
+    assert assignment.trial_count == len(list(assignment.trials()))
 
 
 def test_lines_are_found_of_keys_and_entries() -> None:
     text = "".join(f"key{number} = [1,\n2]\n" for number in range(3_000))
-    found = find_lines(text)
-    assert found[("key0",)] == 1
-    assert found[("key2999",)] == 5999
-    assert found[("key2999", 1)] == 6000
+    lines = find_lines(text)
+    assert lines[("key0",)] == 1
+    assert lines[("key2999",)] == 5999
+    assert lines[("key2999", 1)] == 6000
 
 
 def test_an_ordinary_assignment_has_no_problem() -> None:

@@ -79,8 +79,8 @@ def submitted(folder: Path, *names: str) -> Path:
 
 
 def test_the_second_program_lies_beside_the_first(tmp_path: Path) -> None:
-    asked = Parts(responder="none", second_program="student")
-    submission = read_submission(submitted(tmp_path, "robot.py", "robot2.py"), required_parts=asked)
+    parts = Parts(responder="none", second_program="student")
+    submission = read_submission(submitted(tmp_path, "robot.py", "robot2.py"), required_parts=parts)
     assert submission.files["robot2.py"] == b"print('robot2.py')\n"
     assert unpack_submission(pack_submission(submission)).sha256 == submission.sha256
 
@@ -100,5 +100,5 @@ def test_a_missing_second_program_is_refused(tmp_path: Path, names: list[str], m
 
 @pytest.mark.parametrize("who", ["same", "leader.py"])
 def test_none_is_asked_for_where_the_assignment_says_what_runs(tmp_path: Path, who: str) -> None:
-    asked = Parts(responder="none", second_program=who)
-    assert read_submission(submitted(tmp_path, "robot.py"), required_parts=asked).program is not None
+    parts = Parts(responder="none", second_program=who)
+    assert read_submission(submitted(tmp_path, "robot.py"), required_parts=parts).program is not None

@@ -107,8 +107,8 @@ def _read(
     says: tuple[str, ...],
     refused: tuple[int, str] | None = None,
 ) -> Row:
-    asked = "&".join(f"{name}={value}" for name, value in query.items())
-    api = ("GET", f"{path}?{asked}", None)
+    query_text = "&".join(f"{name}={value}" for name, value in query.items())
+    api = ("GET", f"{path}?{query_text}", None)
     return Row(operation, (path, query), api, command, state="graded", says=says, refused=refused)
 
 

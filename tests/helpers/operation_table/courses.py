@@ -31,8 +31,8 @@ _HOOK = "https://hooks.example.org/other"
 _NO_PAGE = "a program that receives events also sets them up"
 
 
-def _extension(refused: tuple[int, str] | None = None, who: str = "ada", **asked: Any) -> Row:
-    assignment, due, more = asked.get("assignment", ""), asked.get("due", ""), asked.get("more", 0)
+def _extension(refused: tuple[int, str] | None = None, who: str = "ada", **changes: Any) -> Row:
+    assignment, due, more = changes.get("assignment", ""), changes.get("due", ""), changes.get("more", 0)
     api = {"assignment": assignment, "due_at": parse_time(due).isoformat() if due else None, "more_attempts": more}
     words = (f"-a {assignment} " if assignment else "") + (f"--due {due} " if due else "")
     return Row(
@@ -154,15 +154,15 @@ def _no_webhook(webhook: str, refused: tuple[int, str] | None = None) -> Row:
 
 
 def _platform(deployment: str, refused: tuple[int, str] | None = None, **changes: str) -> Row:
-    asked = _PLATFORM | changes
+    registration = _PLATFORM | changes
     options = {"issuer": "issuer", "client": "client_id", "login-url": "authorization_url"}
     options |= {"token-url": "token_url", "keys-url": "keys_url"}
-    told = " ".join(f"--{option} {asked[key]}" for option, key in options.items())
+    options_text = " ".join(f"--{option} {registration[key]}" for option, key in options.items())
     return Row(
         platforms.register,
-        ("/operator/platforms", asked | {"deployments": deployment}),
-        ("POST", "/operator/platforms", asked | {"deployments": deployment.replace(",", " ").split()}),
-        f"platform add '{asked['name']}' {told} "
+        ("/operator/platforms", registration | {"deployments": deployment}),
+        ("POST", "/operator/platforms", registration | {"deployments": deployment.replace(",", " ").split()}),
+        f"platform add '{registration['name']}' {options_text} "
         + " ".join(f"--deployment {each}" for each in deployment.replace(",", " ").split()),
         who="root",
         refused=refused,

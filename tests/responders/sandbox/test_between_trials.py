@@ -120,11 +120,11 @@ def test_a_file_from_the_future_is_dated_at_each_reading(readable: Path) -> None
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
 @pytest.mark.parametrize(
-    ("option", "said"),
+    ("option", "sentence"),
     [("strictatime", "neither relatime nor noatime"), ("noatime", "None"), ("relatime", "None"), ("ro", "None")],
 )
-def test_how_it_is_mounted_decides(option: str, said: str, tmp_path: Path) -> None:
-    assert said in _in_a_mount(option, _READ, tmp_path)
+def test_how_it_is_mounted_decides(option: str, sentence: str, tmp_path: Path) -> None:
+    assert sentence in _in_a_mount(option, _READ, tmp_path)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount")
@@ -148,8 +148,8 @@ def test_this_machine_forgets(tmp_path: Path) -> None:
     with Sandboxes(Isolation(bubblewrap=False)) as sandboxes:
         assert sandboxes.check_data_leaks() is None
     assert listed.stat().st_atime > listed.stat().st_ctime
-    found = {finding.what: finding for finding in examine_machine(Settings(home=tmp_path))}
-    assert (found["between trials"].well, found["between trials"].sentence) == (
+    findings = {finding.what: finding for finding in examine_machine(Settings(home=tmp_path))}
+    assert (findings["between trials"].well, findings["between trials"].sentence) == (
         True,
         "no data remains between trials",
     )

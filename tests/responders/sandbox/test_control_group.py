@@ -218,7 +218,7 @@ def runner(memory_mb=1536):
 
 
 def test_all_processes_of_a_slot_are_in_its_group_and_none_other() -> None:
-    said, _ = in_group(
+    output, _ = in_group(
         """
 seen = set()
 def look():
@@ -230,7 +230,7 @@ with runner() as made:
 print(json.dumps([sandbox, len(inside), os.getpid() in inside, limits, slot.exists()]))
 """
     )
-    sandbox, inside, worker_inside, limits, left_over = said
+    sandbox, inside, worker_inside, limits, left_over = output
     assert "control group" in sandbox
     assert inside >= 4  # two zygotes and their children
     assert not worker_inside
@@ -259,7 +259,7 @@ held += [bytearray(1 << 20) for _ in range(320)]
 
 
 def test_whoever_is_killed_for_the_limit_of_its_slot_is_at_fault_at_once() -> None:
-    said, log = in_group(
+    output, log = in_group(
         f"""
 control_group._EXTRA_MEMORY = -(1 << 30)  # else a slot is never smaller than what the assignment allows
 told = {{}}
@@ -271,15 +271,15 @@ print(json.dumps([told, honest]))
 """,
         TMPDIR="/dev/shm",
     )
-    told, honest = said
+    fault_text, honest = output
     sentence = "the responder was stopped: the submission's processes took more memory together than they may have"
-    assert told == {name: [["memory_limit", sentence]] for name in HOGS}
+    assert fault_text == {name: [["memory_limit", sentence]] for name in HOGS}
     assert honest == "finished"
     assert "run again" not in log
 
 
 def test_whoever_is_killed_because_a_group_above_is_full_is_run_again() -> None:
-    said, log = in_group(
+    output, log = in_group(
         f"""
 with runner() as made:
     faults = run_program(made, BUSY, responder={HOGS["bytes"]!r}).faults
@@ -287,7 +287,7 @@ print(json.dumps([[fault.verdict, fault.message] for fault in faults]))
 """,
         memory_bytes=450 << 20,
     )
-    ((verdict, message),) = said
+    ((verdict, message),) = output
     assert verdict == "memory_limit"
     assert "with nothing else running" in message
     assert "run again" in log

@@ -17,10 +17,10 @@ def responder(text):
 """
 
 
-@pytest.mark.parametrize(("path", "found"), [("..", False), ("../", False), (".", True), ("../..", False)])
-def test_a_folder_above_its_own_has_no_dates(path: str, found: bool, runner: TrialRunner) -> None:
+@pytest.mark.parametrize(("path", "exists"), [("..", False), ("../", False), (".", True), ("../..", False)])
+def test_a_folder_above_its_own_has_no_dates(path: str, exists: bool, runner: TrialRunner) -> None:
     if "doorkeeper" not in run_program(runner, "pass").sandbox:
         pytest.skip("no doorkeeper on this machine")
     recording = run_program(runner, 'import time\nprint("PY::0")\ntime.sleep(1)\n', responder=_ASK.format(path=path))
     answers = [message.text for message in recording.messages if message.sender == "responder"]
-    assert [answer.isdigit() for answer in answers] == [found], answers
+    assert [answer.isdigit() for answer in answers] == [exists], answers

@@ -82,7 +82,7 @@ def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected_output"),
     [
         pytest.param(
             "import joblib\nfor name in ('plain.joblib', 'squeezed.joblib.gz', 'squeezed.joblib.xz'):\n"
@@ -137,8 +137,8 @@ def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
         ),
     ],
 )
-def test_it_works(text: str, said: list[str], sandboxes: Sandboxes, folder: Path) -> None:
-    _says(sandboxes, folder, text, said)
+def test_it_works(text: str, expected_output: list[str], sandboxes: Sandboxes, folder: Path) -> None:
+    _says(sandboxes, folder, text, expected_output)
 
 
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
@@ -161,7 +161,11 @@ for name in {names!r}:
 
 
 def _says(
-    sandboxes: Sandboxes, folder: Path, text: str, said: list[str], role: ChildRole = "responder with libraries"
+    sandboxes: Sandboxes,
+    folder: Path,
+    text: str,
+    expected_output: list[str],
+    role: ChildRole = "responder with libraries",
 ) -> None:
     lines, stop = run_text(sandboxes, role, text + "\ndef responder(text): return text\n", folder)
-    assert (lines, stop) == (said, None)
+    assert (lines, stop) == (expected_output, None)

@@ -80,8 +80,8 @@ def test_a_file_that_may_be_read_may_not_be_changed(
         ],
         check=True,
     )
-    found = {name for name in _CHANGES if not (tmp_path / name).exists() or (tmp_path / name).read_text() != "given"}
-    assert found | {"mapping"} == changed | {"mapping"}
+    document = {name for name in _CHANGES if not (tmp_path / name).exists() or (tmp_path / name).read_text() != "given"}
+    assert document | {"mapping"} == changed | {"mapping"}
 
 
 def test_no_powers_are_left() -> None:
@@ -110,11 +110,11 @@ open("logger.txt", "w").write("mine")
         stamp = sandboxes.check_isolation()
         (folder / "given.txt").write_text("given")
         (folder / "given.txt").chmod(0o600)
-        said, stop = run_text(sandboxes, "robot", text, folder)
+        output, stop = run_text(sandboxes, "robot", text, folder)
         assert (folder / "logger.txt").read_text() == "mine"
     assert "own user, " in stamp
-    assert (stop, said[1]) == (None, "given")
-    assert all(61_000 <= int(number) < 65_000 for number in said[0].split())
+    assert (stop, output[1]) == (None, "given")
+    assert all(61_000 <= int(number) < 65_000 for number in output[0].split())
 
 
 def test_a_folder_that_others_cannot_enter_is_not_open_to_them() -> None:

@@ -21,8 +21,8 @@ WHERE = "import os\nprint(sorted(os.sched_getaffinity(0)))\n"
 def _where(sandboxes: Sandboxes) -> str:
     """Return the processors that a child may use."""
     with sandboxes.open_private_folder() as folder:
-        said, _ = run_text(sandboxes, "robot", WHERE, folder)
-    return said[-1]
+        output, _ = run_text(sandboxes, "robot", WHERE, folder)
+    return output[-1]
 
 
 def test_a_child_runs_where_its_trial_does_and_a_later_one_anywhere() -> None:
@@ -40,10 +40,10 @@ def test_each_trial_has_another_and_where_none_is_free_it_runs_anywhere() -> Non
         pools = [trials.enter_context(ThreadPoolExecutor(1)) for _ in range(len(allowed) + 1)]
         for pool in pools:
             pool.submit(trials.enter_context, one_processor()).result()
-        found = [pool.submit(os.sched_getaffinity, 0).result() for pool in pools]
-    kept_to = [each for each in found if len(each) == 1]
+        affinities = [pool.submit(os.sched_getaffinity, 0).result() for pool in pools]
+    kept_to = [each for each in affinities if len(each) == 1]
     assert len(kept_to) == len(set().union(*kept_to))
-    assert allowed in found
+    assert allowed in affinities
 
 
 def test_what_is_begun_inside_keeps_to_the_same() -> None:

@@ -21,19 +21,19 @@ from service.grading.trial_runner import TrialRunner
 @pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
 def test_every_attempt_is_refused_here(role: str) -> None:
     with Sandboxes() as sandboxes:
-        said = sandboxes.check_isolation(role)  # type: ignore[arg-type]
+        report = sandboxes.check_isolation(role)  # type: ignore[arg-type]
     assert re.fullmatch(
         r"Landlock \d+, seccomp, doorkeeper, (own user, )?(bubblewrap, )?(fixed addresses, )?process limits, "
         r"policy [0-9a-f]{8} \(battery .*\)",
-        said,
+        report,
     )
-    assert f"{len(ATTEMPTS)} of {len(ATTEMPTS)} refused" in said
+    assert f"{len(ATTEMPTS)} of {len(ATTEMPTS)} refused" in report
 
 
 def test_the_battery_notices_a_layer_that_does_not_stand() -> None:
     with Sandboxes(Isolation(seccomp=False)) as sandboxes:
-        said = sandboxes.check_isolation()
-    refused = re.search(r"(\d+) of (\d+) refused", said)
+        report = sandboxes.check_isolation()
+    refused = re.search(r"(\d+) of (\d+) refused", report)
     assert refused is not None
     assert int(refused[1]) < int(refused[2])
 
@@ -66,9 +66,9 @@ def test_addresses_are_as_fixed_in_bubblewrap_as_without_it() -> None:
 def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
     """Return the process id that the child sees: in a new namespace 2, after the doorkeeper."""
     with sandboxes.open_private_folder() as folder:
-        said, stop = run_text(sandboxes, "robot", "import os; print(os.getppid())", folder)
+        output, stop = run_text(sandboxes, "robot", "import os; print(os.getppid())", folder)
     assert stop is None
-    return int(said[0])
+    return int(output[0])
 
 
 def test_a_trial_is_the_same_inside_bubblewrap_and_out() -> None:

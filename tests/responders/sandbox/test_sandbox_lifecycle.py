@@ -176,10 +176,10 @@ def _children(pid: int) -> list[int]:
 
 
 def _descendants(pid: int) -> set[int]:
-    found, parents = {pid}, list(_parents())
-    while more := {child for child, parent in parents if parent in found} - found:
-        found |= more
-    return found - {pid}
+    descendants, parents = {pid}, list(_parents())
+    while more := {child for child, parent in parents if parent in descendants} - descendants:
+        descendants |= more
+    return descendants - {pid}
 
 
 def test_what_children_import_is_compiled_once_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

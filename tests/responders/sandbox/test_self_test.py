@@ -126,14 +126,14 @@ tell()
             if role == "program":
                 first = run_program(runner, _search([], _LAST) + leave + "tell()\n")
                 second = run_program(runner, look)
-                said = [line.text for line in second.printed]
+                page_text = [line.text for line in second.printed]
             else:
                 first = run_program(runner, "pass", responder=_search([], _LAST) + leave + write + "tell()\n" + answer)
                 second = run_program(runner, 'print("PY::x")', responder=look + answer)
-                said = second.responder_output.splitlines()
-                assert said.pop(2) == "seen []"
+                page_text = second.responder_output.splitlines()
+                assert page_text.pop(2) == "seen []"
             assert _LAST.encode() in _everything(first)
-            assert said == ["seen False False False", "seen True False"]
+            assert page_text == ["seen False False False", "seen True False"]
             assert second.faults == ()
 
 

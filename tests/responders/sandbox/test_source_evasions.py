@@ -39,8 +39,8 @@ def assignment(part: str, rules: dict[str, Any]) -> Assignment:
     if part == "program":
         scenario = Scenario("s", (Pose(200, 800, 0),), seconds=5.0)
         return Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (source,))
-    asked = criterion("functions", id="functions", marks="1", function="f", calls=[{"returns": True}])
-    return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (source, asked))
+    rule = criterion("functions", id="functions", marks="1", function="f", calls=[{"returns": True}])
+    return Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (source, rule))
 
 
 def files_of(case: dict[str, Any]) -> dict[str, bytes]:
@@ -63,14 +63,18 @@ def files_of(case: dict[str, Any]) -> dict[str, bytes]:
 
 def graded(case: dict[str, Any], folder: Path, runner: TrialRunner) -> Grade:
     part = case.get("part", "responder")
-    asked = assignment(part, {name: case[name] for name in _RULES if name in case})
+    graded_assignment = assignment(part, {name: case[name] for name in _RULES if name in case})
     if "cells" in case:
         cells = tuple(Cell(number, source) for number, source in enumerate(case["cells"], 1))
-        return grade(Submission("ada", notebook=Notebook("a.ipynb", cells), files=files_of(case)), asked, runner=runner)
+        return grade(
+            Submission("ada", notebook=Notebook("a.ipynb", cells), files=files_of(case)),
+            graded_assignment,
+            runner=runner,
+        )
     (folder / ("robot.py" if part == "program" else "responder.py")).write_text(case["text"].lstrip("\n"), "utf-8")
     for name, data in files_of(case).items():
         (folder / name).write_bytes(data)
-    return grade(read_submission(folder, required_parts=asked.parts), asked, runner=runner)
+    return grade(read_submission(folder, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
 
 
 # Cases that remove the same modules are adjacent, so that they share a zygote.
@@ -103,8 +107,12 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, run
     (tmp_path / "robot.py").write_text("print('PY::x')\nimport time\ntime.sleep(1)")
     (tmp_path / "responder.py").write_text(NETWORK)
     scenario = Scenario("s", (Pose(200, 800, 0),), seconds=5.0)
-    asked = Assignment("a", "A", WorldSpec(), Parts(), (scenario,), (WITHOUT,))
-    recording = grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).trials[0].recording
+    graded_assignment = Assignment("a", "A", WorldSpec(), Parts(), (scenario,), (WITHOUT,))
+    recording = (
+        grade(read_submission(tmp_path, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
+        .trials[0]
+        .recording
+    )
     assert recording.verdict is Verdict.RESPONDER_ERROR
     assert recording.faults[0].message == "ModuleNotFoundError: joblib is not allowed in this assignment"
     assert recording.faults[0].line == 1
@@ -115,8 +123,13 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, run
 def test_only_what_carries_marks_is_refused(rules: dict[str, Any], tmp_path: Path, runner: TrialRunner) -> None:
     text = "import joblib\ndef f(): return True\n"
     (tmp_path / "responder.py").write_text(text)
-    asked = assignment("responder", {"uses": ["import joblib"], **rules})
-    assert grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks == 1
+    graded_assignment = assignment("responder", {"uses": ["import joblib"], **rules})
+    assert (
+        grade(read_submission(tmp_path, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
+        .criteria[1]
+        .marks
+        == 1
+    )
 
 
 COMPILED = """
@@ -135,15 +148,22 @@ def test_what_was_compiled_of_a_closed_file_is_closed_too(
     # The parent folder may be closed to other users.
     compiled.parent.chmod(0o755)
     (tmp_path / "responder.py").write_text(COMPILED.format(name=compiled.name))
-    asked = assignment("responder", {"avoids": [f"import {module}"]})
-    assert grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks == marks
+    graded_assignment = assignment("responder", {"avoids": [f"import {module}"]})
+    assert (
+        grade(read_submission(tmp_path, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
+        .criteria[1]
+        .marks
+        == marks
+    )
 
 
 def test_a_robot_program_does_without_what_its_preamble_needs(tmp_path: Path, runner: TrialRunner) -> None:
     text = "say('x')\nfrom ev3dev2.sound import Sound\nsay('y')"
     (tmp_path / "robot.py").write_text(text)
-    asked = assignment("program", {"avoids": ["import ev3dev2.sound", "import time"]})
-    trial = grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).trials[0]
+    graded_assignment = assignment("program", {"avoids": ["import ev3dev2.sound", "import time"]})
+    trial = grade(
+        read_submission(tmp_path, required_parts=graded_assignment.parts), graded_assignment, runner=runner
+    ).trials[0]
     assert [line.text for line in trial.recording.spoken] == ["x"]
     assert trial.recording.faults[0].message == "ModuleNotFoundError: ev3dev2.sound is not allowed in this assignment"
 
@@ -151,9 +171,11 @@ def test_a_robot_program_does_without_what_its_preamble_needs(tmp_path: Path, ru
 def test_one_job_after_the_other_has_its_own_modules(tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "responder.py").write_text("def f():\n    import sklearn\n    return True\n")
     for rules, marks in (({"avoids": ["import sklearn"]}, 0), ({"uses": ["import sklearn"]}, 1)) * 2:
-        asked = assignment("responder", rules)
+        graded_assignment = assignment("responder", rules)
         assert (
-            grade(read_submission(tmp_path, required_parts=asked.parts), asked, runner=runner).criteria[1].marks
+            grade(read_submission(tmp_path, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
+            .criteria[1]
+            .marks
             == marks
         )
 
@@ -170,12 +192,12 @@ def test_what_staff_are_told_no_student_reads(tmp_path: Path, runner: TrialRunne
     ):
         assert words in staff
     assert words not in render_report_page(build_student_view(result), {})
-    shown = build_student_view(result)
+    view = build_student_view(result)
     assert all(
         words not in text
         for text in (
-            render_plain_text(shown),
-            render_json(shown),
+            render_plain_text(view),
+            render_json(view),
             render_marks_csv([row_of(result).apply_view(build_student_view)]),
         )
     )

@@ -78,13 +78,13 @@ def _arguments(everything: bool) -> list[list[int]]:
     if not everything:
         return [[value] * 6 for value in (0, 1, PID, HIGH, (1 << 64) - 1)]
     values = {edge & (1 << 64) - 1 for plain in EDGES for edge in (plain, plain | HIGH)}
-    found = []
+    argument_lists = []
     for place, value in itertools.product(range(6), sorted(values)):
         for fill in (0, 0o102, PID, (1 << 64) - 1):
             arguments = [fill] * 6
             arguments[place] = value
-            found.append(arguments)
-    return found
+            argument_lists.append(arguments)
+    return argument_lists
 
 
 @pytest.mark.parametrize("number", range(601))
@@ -152,8 +152,8 @@ def test_nothing_that_reaches_others_is_allowed() -> None:
         "module",
         "xattr",
     ]
-    found = {name for name in ALLOWED if any(word in name for word in words)}
-    assert not found
+    allowed_names = {name for name in ALLOWED if any(word in name for word in words)}
+    assert not allowed_names
 
 
 def test_whoever_names_a_path_has_to_ask() -> None:
@@ -178,8 +178,8 @@ def test_whoever_names_a_path_has_to_ask() -> None:
         for name, decision in CALLS.values()
         if decision in ("allow", "some") and any(word in name for word in words)
     }
-    asked = {CALLS[number][0] for number in range(601) if decide(build_path_filter(), number) == "ask"}
-    assert asked == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATH_ARGUMENTS}
+    checked_calls = {CALLS[number][0] for number in range(601) if decide(build_path_filter(), number) == "ask"}
+    assert checked_calls == naming - {"fstat", "ftruncate"} == {CALLS[number][0] for number in PATH_ARGUMENTS}
     assert {decide(build_path_filter(), number) for number in range(601) if number not in PATH_ARGUMENTS} == {"allow"}
 
 

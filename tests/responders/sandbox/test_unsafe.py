@@ -26,10 +26,10 @@ def test_a_run_without_sandbox_says_so(flags: tuple[str, ...], tmp_path: Path) -
     program, trace = tmp_path / "robot.py", tmp_path / "trace.json"
     program.write_text("import os\nprint(len(os.listdir('/')) > 3)\n")
     ran = robomark("run", program, "--trace", trace, *flags)
-    told = json.loads(trace.read_text())
-    assert (told["sandbox"] == _STAMP) == bool(flags)
+    document = json.loads(trace.read_text())
+    assert (document["sandbox"] == _STAMP) == bool(flags)
     assert ("NO SANDBOX" in ran.stderr) == bool(flags)
-    assert [text for _, text in told["printed"]] == ["True"] * len(flags)
+    assert [text for _, text in document["printed"]] == ["True"] * len(flags)
 
 
 @pytest.mark.parametrize("flags", [(), (_FLAG,)], ids=["sandbox", "none"])
@@ -58,8 +58,8 @@ def test_a_worker_without_sandbox_says_so_in_every_grade(tmp_path: Path) -> None
             worker.terminate()
             worker.wait()
         assert submitted.returncode == 0, submitted.stderr
-        shown = robomark("show", _grade_id(submitted.stdout), **home)
-        assert (f"sandbox: {_STAMP}\n" in shown.stdout) == bool(flags)
+        output = robomark("show", _grade_id(submitted.stdout), **home)
+        assert (f"sandbox: {_STAMP}\n" in output.stdout) == bool(flags)
 
 
 def _grade_id(table: str) -> str:

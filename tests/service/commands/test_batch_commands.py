@@ -58,9 +58,9 @@ def test_a_batch_is_of_the_course_that_is_named_and_listed_there(tmp_path: Path)
 
 
 def _batch_id(ended: Ended) -> str:
-    found = re.search(r"batch (\w{12}): 2 queued", ended.out)
-    assert found is not None, ended
-    return found[1]
+    match = re.search(r"batch (\w{12}): 2 queued", ended.out)
+    assert match is not None, ended
+    return match[1]
 
 
 def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, Path]) -> None:
@@ -98,12 +98,12 @@ def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
 
 def test_show_tells_a_grade_and_writes_it(graded: tuple[Path, Ended, Path], tmp_path: Path) -> None:
     home, ended, _ = graded
-    found = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
-    assert found is not None
+    match = re.search(r"^reference .* (\w{12})$", ended.out, re.MULTILINE)
+    assert match is not None
     files = ("--output", tmp_path / "out", "--replay", tmp_path / "replay.json")
-    shown = robomark(home, "show", found[1], *files, "--language", "de")
-    assert shown.status == 0
-    assert "Full marks" in shown.out
+    result = robomark(home, "show", match[1], *files, "--language", "de")
+    assert result.status == 0
+    assert "Full marks" in result.out
     images = sorted((tmp_path / "out").glob("*.png"))
     assert images
     assert all(image.read_bytes().startswith(b"\x89PNG") for image in images)
@@ -121,9 +121,9 @@ def test_show_lays_one_grade_over_another_and_films_a_trial(graded: tuple[Path, 
         for who in ("reference", "flawed")
     )
     film = tmp_path / "film.gif"
-    shown = robomark(home, "show", flawed, "--over", flawed, "--replay", tmp_path / "own.json", "--film", film)
-    assert shown.status == 0
-    assert f"film: {film}" in shown.err
+    result = robomark(home, "show", flawed, "--over", flawed, "--replay", tmp_path / "own.json", "--film", film)
+    assert result.status == 0
+    assert f"film: {film}" in result.err
     assert film.read_bytes().startswith(b"GIF89a")
     (over,) = {trial["over"]["parted"] for trial in json.loads((tmp_path / "own.json").read_text())["trials"]}
     assert over is None

@@ -50,9 +50,9 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Ended]
 
 
 def _batch(ended: Ended) -> str:
-    found = re.search(r"batch (\w{12}): \d+ queued", ended.out)
-    assert found is not None, ended
-    return found[1]
+    match = re.search(r"batch (\w{12}): \d+ queued", ended.out)
+    assert match is not None, ended
+    return match[1]
 
 
 def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Path, Path, Ended]) -> None:

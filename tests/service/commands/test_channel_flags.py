@@ -41,11 +41,11 @@ def test_flags_change_what_they_name_and_nothing_else(before: Channel, flags: di
 
 def test_a_run_shows_what_was_lost(tmp_path: Path) -> None:
     trace, replay = tmp_path / "trace.json", tmp_path / "replay.html"
-    shown = robomark(
+    result = robomark(
         *("run", ECHO / "robot.py", "--responder", ECHO / "responder.py", "--trace", trace, "--replay", replay),
         *("-b", "Empty_Map", "-x", "100", "-y", "800", "--link", "infrared", "--beacon", "900,800", "--range", "700"),
     )
-    assert "(lost) PY::0: out of range, 800 mm away" in shown.stdout
+    assert "(lost) PY::0: out of range, 800 mm away" in result.stdout
     first = json.loads(trace.read_text())["messages"][0]
     assert (first["lost"], first["distance"], first["angle"], first["delivered"]) == ("out of range", 800, 0, None)
 
@@ -61,5 +61,5 @@ def test_a_grade_on_another_channel_says_so() -> None:
     assert usual["marks"] == 10 > lost["marks"]
     replies = next(line["message"] for line in lost["criteria"] if line["id"] == "content")
     assert 'Expected the responder to be sent "PY::0", but the channel lost it (the robot was 1900 mm' in replies
-    told = robomark("grade", ECHO, "-a", "json-queue", *away).stdout
-    assert "graded with another channel than the assignment's" in " ".join(told.split())
+    output = robomark("grade", ECHO, "-a", "json-queue", *away).stdout
+    assert "graded with another channel than the assignment's" in " ".join(output.split())

@@ -59,12 +59,12 @@ def test_what_is_mistyped_gets_one_sentence(
     monkeypatch.setattr(sys, "argv", ["robomark", *line.split(" ")])
     with pytest.raises(SystemExit) as ended:
         main()
-    shown = capsys.readouterr()
-    assert (ended.value.code, shown.out) == (2, "")
-    assert shown.err.startswith("robomark: ")
-    assert words in shown.err
-    assert shown.err.count("\n") == 1
-    assert "\x1b" not in shown.err
+    captured = capsys.readouterr()
+    assert (ended.value.code, captured.out) == (2, "")
+    assert captured.err.startswith("robomark: ")
+    assert words in captured.err
+    assert captured.err.count("\n") == 1
+    assert "\x1b" not in captured.err
 
 
 def test_a_reader_that_goes_away_is_no_error_of_ours() -> None:
@@ -154,7 +154,7 @@ def test_what_only_asks_imports_nothing_heavy(tmp_path: Path) -> None:
         check=True,
     )
     loaded = json.loads(ended.stdout)
-    assert {line: shared for line, found in loaded.items() if (shared := sorted(asking[line] & set(found)))} == {}
+    assert {line: shared for line, each in loaded.items() if (shared := sorted(asking[line] & set(each)))} == {}
     assert loaded.keys() == asking.keys()
     assert "sqlalchemy" in loaded["batch list"]
 

@@ -168,11 +168,11 @@ def test_the_table_of_keys_for_instructors_has_every_command_and_key() -> None:
 def test_every_command_that_is_listed_can_be_loaded_and_is_listed_whole() -> None:
     for words in ALL:
         assert load_command(*words).help, words
-    shown = robomark("--help").stdout + "".join(robomark(name, "--help").stdout for name in ("batch", "assignments"))
-    told = " ".join(shown.split())
+    text = robomark("--help").stdout + "".join(robomark(name, "--help").stdout for name in ("batch", "assignments"))
+    output = " ".join(text.split())
     groups = (COMMANDS["batch"], COMMANDS["assignments"])
     for listed in (*COMMANDS.values(), *(each for group in groups for each in group.commands.values())):  # type: ignore[union-attr]
-        assert listed.summary in told
+        assert listed.summary in output
 
 
 @pytest.fixture(scope="module")
@@ -216,9 +216,9 @@ def test_a_command_tells_the_same_in_words_and_as_a_document(
     assert plain.stderr == ""
     assert plain.stdout.strip()
     assert not _BOXES_AND_ESCAPES.search(plain.stdout), plain.stdout
-    told = json.loads(document.stdout)
-    assert told["schema"] == 1
-    assert told.keys() == {"schema", *keys.split()}
+    json_document = json.loads(document.stdout)
+    assert json_document["schema"] == 1
+    assert json_document.keys() == {"schema", *keys.split()}
 
 
 def test_a_pipe_gets_whole_names_and_a_row_a_line(home: tuple[Path, dict[str, str]], tmp_path: Path) -> None:

@@ -63,9 +63,9 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
     ]
     ended = robomark(home, *words)
     assert ended.status == 2
-    found = re.search(r"batch (\w{12}): 2 queued", ended.out)
-    assert found is not None, ended
-    status = robomark(home, "batch", "status", found[1]).out
+    match = re.search(r"batch (\w{12}): 2 queued", ended.out)
+    assert match is not None, ended
+    status = robomark(home, "batch", "status", match[1]).out
     for row in (
         r"^Ada Lovelace .* 10 / 10 +completed",
         r"^Alan Turing .* 6 / 10 +completed; no responder\.py",
@@ -73,7 +73,7 @@ def test_a_download_of_moodles_becomes_its_worksheet_and_feedback(download: Path
     ):
         assert re.search(row, status, re.MULTILINE), status
     filled, feedback = tmp_path / "filled.csv", tmp_path / "feedback.zip"
-    export = ("batch", "export", found[1], "--format")
+    export = ("batch", "export", match[1], "--format")
     assert robomark(home, *export, "moodle-worksheet", "--worksheet", sheet, "-o", filled).status == 0
     grades = imported_by_moodle(filled.read_text("utf-8"))
     assert {number: grade for number, (grade, _) in grades.items()} == {"500000": 10, "500001": 6, "500002": None}

@@ -72,15 +72,15 @@ def test_who_wrote_and_did_the_same_is_one_pair_with_all_its_evidence(graded: tu
     _, store, batch = graded
     with store.reading() as session:
         lines = job_lines.load_job_lines(session, batch)
-    (found,) = find_similar_submissions(store, lines)
-    (pair,) = found.pairs
+    (similar_submissions,) = find_similar_submissions(store, lines)
+    (pair,) = similar_submissions.pairs
     assert pair.students == ("ada", "zebedee")
     assert [each.files for each in pair.sources] == [("responder.py", "responder.py")]
     assert {(each.trial.scenario, each.aspect) for each in pair.trials} >= {
         ("plain", "path"),
         ("with-obstacle", "path"),
     }
-    assert found.too_short == tuple(f"s{number}" for number in range(8))
+    assert similar_submissions.too_short == tuple(f"s{number}" for number in range(8))
     given = find_similar_submissions(store, lines, locate_examples(ASSIGNMENT) / "reference" / "responder.py")
     assert [each.sources for each in given[0].pairs] == [()]
 
@@ -106,8 +106,8 @@ def test_the_command_shows_a_table_and_writes_a_page(
 
 def test_json_is_all_that_is_printed(graded: tuple[Path, Store, str]) -> None:
     home, _, batch = graded
-    told = json.loads(robomark(home, "batch", "similar", batch, "--json").out)
-    assert [pair["students"] for pair in told["assignments"][0]["pairs"]] == [["ada", "zebedee"]]
+    document = json.loads(robomark(home, "batch", "similar", batch, "--json").out)
+    assert [pair["students"] for pair in document["assignments"][0]["pairs"]] == [["ada", "zebedee"]]
 
 
 def test_no_report_and_no_format_has_anything_of_it(graded: tuple[Path, Store, str], tmp_path: Path) -> None:
@@ -117,8 +117,8 @@ def test_no_report_and_no_format_has_anything_of_it(graded: tuple[Path, Store, s
         grades = [results.load_grade(session, line.id) for line in lines]
     for line, grade in zip(lines, grades, strict=True):
         if line.student == "ada":
-            told = [form.document(grade) for form in FORMATS.values() if form.document is not None]
+            documents = [form.document(grade) for form in FORMATS.values() if form.document is not None]
             write_batch_reports(store, "class", [line], [], tmp_path)
-            told += [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()]
-            assert len(told) > 3
-            assert not any("zebedee" in text for text in told)
+            documents += [path.read_text(encoding="utf-8") for path in tmp_path.iterdir()]
+            assert len(documents) > 3
+            assert not any("zebedee" in text for text in documents)

@@ -47,7 +47,7 @@ def with_given_parser(text: str) -> Assignment:
 
 
 @pytest.mark.parametrize(
-    ("parser", "verdict", "told"),
+    ("parser", "verdict", "words"),
     [
         (
             "def parser(text) return text",
@@ -60,12 +60,12 @@ def with_given_parser(text: str) -> Assignment:
     ],
 )
 def test_a_given_agents_mistake_is_the_instructors(
-    parser: str, verdict: Verdict, told: str, runner: TrialRunner
+    parser: str, verdict: Verdict, words: str, runner: TrialRunner
 ) -> None:
     result = grade(REFERENCE, with_given_parser(parser), runner=runner)
     recording = result.trials[0].recording
     assert result.verdict is verdict
-    assert told in "".join([*recording.notes, *(fault.message for fault in recording.faults)])
+    assert words in "".join([*recording.notes, *(fault.message for fault in recording.faults)])
     assert [fault.agent for fault in recording.faults if fault.verdict is Verdict.RESPONDER_ERROR][:1] in (
         [],
         ["agent"],
@@ -123,8 +123,8 @@ def test_a_notebook_without_one_of_the_agents_is_told_where_to_put_it(tmp_path: 
 
 def judged(full: Grade, check: str, **keys: Any) -> tuple[bool, str]:
     table = {"id": "c", "title": "C", "marks": "1", "check": check, **keys}
-    asked = replace(ASSIGNMENT, criteria=(SCHEMAS[check].model_validate(table),))
-    (result,) = judge(asked, full.trials)
+    criterion = replace(ASSIGNMENT, criteria=(SCHEMAS[check].model_validate(table),))
+    (result,) = judge(criterion, full.trials)
     return result.marks == 1, result.message
 
 
@@ -176,9 +176,9 @@ def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
     (trial,) = build_json_document(build_staff_view(full))["trials"]
     assert trial["agent_messages"][2]["text"] == "0"
     assert len(to_json_trial(full.trials[0])["agent_messages"]) == len(recording.agent_messages) == 24
-    told = build_conversation(recording)
-    assert told.parties == ("robot", "responder", "parser", "agent", "logger")
-    first = [(step.source, step.target, step.kind) for step in told.steps[:4] if isinstance(step, Step)]
+    conversation = build_conversation(recording)
+    assert conversation.parties == ("robot", "responder", "parser", "agent", "logger")
+    first = [(step.source, step.target, step.kind) for step in conversation.steps[:4] if isinstance(step, Step)]
     assert first == [
         ("robot", "responder", "message"),
         ("responder", "agent", "call"),
@@ -189,8 +189,8 @@ def test_what_agents_say_is_in_reports_and_exports(full: Grade) -> None:
 
 def test_an_agent_of_any_name_has_a_lane(full: Grade) -> None:
     recording = full.trials[0].recording
-    asked = AgentMessage(0.0, "responder", "translator", "PY::0", 0)
-    other = replace(recording, agent_messages=(asked,), agent_outputs=(AgentOutput("translator", "", ""),))
+    message = AgentMessage(0.0, "responder", "translator", "PY::0", 0)
+    other = replace(recording, agent_messages=(message,), agent_outputs=(AgentOutput("translator", "", ""),))
     assert build_conversation(other).parties == ("robot", "responder", "translator")
 
 

@@ -30,8 +30,8 @@ def without_robot(*criteria: Criterion) -> Assignment:
 
 
 def answers(text: str, runner: TrialRunner, **rules: Any) -> SourceAnswers:
-    asked = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (), (criterion("source", **rules),))
-    plan = plan_run(Submission("ada", program=SourceFile("robot.py", text)), asked)
+    assignment = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (), (criterion("source", **rules),))
+    plan = plan_run(Submission("ada", program=SourceFile("robot.py", text)), assignment)
     return analyse(plan, (), runner, JobMeter()).answers["c"]
 
 
@@ -112,9 +112,9 @@ def test_rule_that_is_broken_is_told_with_its_line(runner: TrialRunner) -> None:
     ],
 )
 def test_hostile_texts_are_read_or_refused_inside_the_sandbox(text: str, error: str, runner: TrialRunner) -> None:
-    found = answers(text, runner, avoids=["say()", "import time"], uses=["for"])
-    assert error in found.error
-    assert bool(found.error) is bool(error)
+    outcomes = answers(text, runner, avoids=["say()", "import time"], uses=["for"])
+    assert error in outcomes.error
+    assert bool(outcomes.error) is bool(error)
 
 
 def test_what_is_avoided_cannot_be_hidden_behind_many_names(runner: TrialRunner) -> None:
@@ -253,7 +253,7 @@ SOUND: dict[str, Any] = {
 
 
 @pytest.mark.parametrize(
-    "told",
+    "answer",
     [
         *(None, 3, [], {}, {"unread": None}),
         *(SOUND | {"uses": uses} for uses in ([], [None, None], [3], [["x"]], [["x", "y"]], None)),
@@ -261,10 +261,10 @@ SOUND: dict[str, Any] = {
         *(SOUND | {"unread": unread} for unread in (["x"], ["", "", "x"], 3)),
     ],
 )
-def test_nonsense_from_the_reader_is_no_answer(told: Any) -> None:
+def test_nonsense_from_the_reader_is_no_answer(answer: Any) -> None:
     rules = criterion("source", uses=["for"])
     assert SourceAnswers.read(SOUND, rules).uses  # type: ignore[arg-type]
-    assert SourceAnswers.read(told, rules).error == "it cannot be read"  # type: ignore[arg-type]
+    assert SourceAnswers.read(answer, rules).error == "it cannot be read"  # type: ignore[arg-type]
 
 
 def test_text_of_a_notebook_is_its_plain_cells() -> None:
@@ -288,8 +288,8 @@ DRIVES = "import time\ntank_drive.on_for_seconds(20, 20, 0.1)\n"
 
 def driven_by(text: str, runner: TrialRunner, *, visibility: str = "visible", **rules: Any) -> CriterionResult:
     scenario = Scenario("s", (Pose(200, 600, 0),), seconds=5, visibility=visibility)  # type: ignore[arg-type]
-    asked = criterion("source", **rules)
-    drives = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (asked,))
+    rule = criterion("source", **rules)
+    drives = Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (rule,))
     program = SourceFile("robot.py", f"%%sim_magic_preloaded\n{text}")
     files = {"helper.py": b"def twice(go):\n    for _ in range(2):\n        go()\n"}
     return grade(Submission("ada", program=program, files=files), drives, runner=runner).criteria[0]
@@ -375,8 +375,8 @@ def test_rules_about_code_tell_nothing_about_hidden_calls(
 ) -> None:
     """A construct that runs only for some arguments would otherwise reveal the arguments of hidden calls."""
     rule = criterion("source", part="responder", uses=["while"])
-    asked = [{"arguments": [number], "returns": 0, "hidden": hidden} for number, hidden in calls]
-    called = criterion("functions", function="f", calls=asked).model_copy(update={"id": "f"})
+    function_calls = [{"arguments": [number], "returns": 0, "hidden": hidden} for number, hidden in calls]
+    called = criterion("functions", function="f", calls=function_calls).model_copy(update={"id": "f"})
     submission = Submission("ada", responder=SourceFile("responder.py", text))
     result = grade(submission, without_robot(rule, called), runner=runner)
     assert [each.marks == 4 for each in result.criteria] == [holds, True], result.criteria[0].message
@@ -392,7 +392,7 @@ def test_looking_at_statements_changes_no_recording(runner: TrialRunner) -> None
     text = f"%%sim_magic_preloaded\n{DRIVES}{loop}"
     scenario = Scenario("s", (Pose(200, 600, 0),), seconds=5)
     rules = criterion("source", uses=["for"]), criterion("finishes")
-    found = [
+    hashes = [
         grade(
             Submission("ada", program=SourceFile("robot.py", text)),
             Assignment("a", "A", WorldSpec(), Parts("student", "none"), (scenario,), (rule,)),
@@ -402,5 +402,5 @@ def test_looking_at_statements_changes_no_recording(runner: TrialRunner) -> None
         .recording
         for rule in rules
     ]
-    assert found[0].sha256 == found[1].sha256
-    assert found[0].faults == found[1].faults
+    assert hashes[0].sha256 == hashes[1].sha256
+    assert hashes[0].faults == hashes[1].faults

@@ -181,19 +181,19 @@ def test_what_was_seen_from_many_sides_is_one_thing(
     runner: TrialRunner,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    asked = find_assignment(name)
-    only = next(each for each in asked.criteria if each.id == marked)
-    asked = replace(asked, criteria=(only,))
-    submission = read_submission(DATA / "evidence" / folder, required_parts=asked.parts)
+    assignment = find_assignment(name)
+    only = next(each for each in assignment.criteria if each.id == marked)
+    assignment = replace(assignment, criteria=(only,))
+    submission = read_submission(DATA / "evidence" / folder, required_parts=assignment.parts)
     if answers == "the network":
         responder = (locate_examples(name) / "reference" / "responder.py").read_text()
         submission = replace(submission, responder=SourceFile("responder.py", responder))
-    graded = grade(submission, asked, runner=runner)
+    graded = grade(submission, assignment, runner=runner)
     assert graded.marks == Decimal(now), graded.criteria[0].message
     # Without the countermeasure, patterns differ by the robot's position, or always, and the marks are much higher.
     monkeypatch.setattr(patterns, "locate_part", lambda recording, side, pose: (pose.x, pose.y))
-    monkeypatch.setattr(collecting, "_drop_repeated_pairs", lambda found, recording: found)
-    (once,) = judge(asked, graded.trials)
+    monkeypatch.setattr(collecting, "_drop_repeated_pairs", lambda image_pairs, recording: image_pairs)
+    (once,) = judge(assignment, graded.trials)
     assert once.marks == Decimal(before), once.message
 
 
@@ -245,20 +245,20 @@ def test_one_place_gives_one_image_whatever_the_noise() -> None:
         run = _photographed(*((_looking_at(x, 920, 0), "square", "") for x in places))
         return replace(run, images=tuple(replace(image, right=patch) for image in run.images))
 
-    asked = criterion("collects", source="sent", each=4, classes=["square"], over="mean")
-    still = judged(asked, collected(310, 310, 310, 310))
+    rule = criterion("collects", source="sent", each=4, classes=["square"], over="mean")
+    still = judged(rule, collected(310, 310, 310, 310))
     assert still.marks == 1
     assert "3 repeat" in judged(criterion("collects", source="sent", classes=["square"]), collected(*[310] * 4)).message
-    assert judged(asked, collected(306, 308, 310, 312)).marks == 4
+    assert judged(rule, collected(306, 308, 310, 312)).marks == 4
 
 
 def test_what_lies_beside_the_floor_is_nothing_to_come_upon() -> None:
     dark = [(255, 255, 255)] * 20 + [(0, 0, 0)] * 40
     moves = (straight(100), straight(-50), spin(90))
-    asked = criterion("encounters", below=40)
-    assert judged(asked, driven(*moves, rgb=dark[: 20 + 10 + 30], start=Pose(1000, 500, 0))).marks == 4
+    rule = criterion("encounters", below=40)
+    assert judged(rule, driven(*moves, rgb=dark[: 20 + 10 + 30], start=Pose(1000, 500, 0))).marks == 4
     off = driven(*moves, rgb=dark[: 20 + 10 + 30], start=Pose(1000, 1120, 90))
-    assert judged(asked, off).marks == 0
+    assert judged(rule, off).marks == 0
 
 
 @pytest.mark.parametrize(
@@ -281,27 +281,27 @@ def test_black_beside_the_floor_is_not_stopped_on(y: float, reads: float, keys: 
 
 def test_an_event_is_not_said_where_another_belongs() -> None:
     run = driven(straight(600), start=Pose(100, 500, 0))
-    here, there = {"text": "1", "zone": [100, 400, 300, 600]}, {"text": "2", "zone": [400, 400, 700, 600]}
-    asked = criterion("events", sensor="middle", source="speech", events=[here, there], over="mean")
+    first_event, there = {"text": "1", "zone": [100, 400, 300, 600]}, {"text": "2", "zone": [400, 400, 700, 600]}
+    rule = criterion("events", sensor="middle", source="speech", events=[first_event, there], over="mean")
 
-    def said(*lines: tuple[float, str]) -> CriterionResult:
-        return judged(asked, replace(run, spoken=tuple(TimedText(t, text) for t, text in lines)))
+    def judge_speech(*lines: tuple[float, str]) -> CriterionResult:
+        return judged(rule, replace(run, spoken=tuple(TimedText(t, text) for t, text in lines)))
 
-    assert said((1.0, "1"), (3.0, "2")).marks == 4
-    assert said((1.0, "1"), (1.8, "nearly 2"), (3.0, "2"), (3.5, "2")).marks == 4  # between the places
-    both = said((1.0, "1 2"), (3.0, "1 2"))
+    assert judge_speech((1.0, "1"), (3.0, "2")).marks == 4
+    assert judge_speech((1.0, "1"), (1.8, "nearly 2"), (3.0, "2"), (3.5, "2")).marks == 4  # between the places
+    both = judge_speech((1.0, "1 2"), (3.0, "1 2"))
     assert both.marks == 0
     assert "and not at the place of another text, but it came at" in both.message
-    assert said((1.0, "1"), (1.1, "2"), (3.0, "2")).marks == 2
+    assert judge_speech((1.0, "1"), (1.1, "2"), (3.0, "2")).marks == 2
 
 
 def test_a_reading_that_is_printed_again_is_one_sample() -> None:
     run = driven(rest(90))
     repeated = tuple(DatalogEntry(0.5 + n / 1000, "Light_left", 255.0 - n / 10, None) for n in range(10))
-    asked = criterion("datalog", series="Light_left", measured="left light", at_least=10, over="mean")
-    assert judged(asked, replace(run, datalog=repeated)).marks == Decimal("0.40")
+    rule = criterion("datalog", series="Light_left", measured="left light", at_least=10, over="mean")
+    assert judged(rule, replace(run, datalog=repeated)).marks == Decimal("0.40")
     read = tuple(DatalogEntry(0.5 + n / 100, "Light_left", 255.0, None) for n in range(10))
-    assert judged(asked, replace(run, datalog=read)).marks == 4
+    assert judged(rule, replace(run, datalog=read)).marks == 4
 
 
 def _talk(*exchanges: tuple[str, str]) -> Recording:
@@ -324,15 +324,15 @@ def test_a_message_that_is_sent_again_asks_nothing_new() -> None:
 
 def test_what_belongs_to_other_poses_is_not_reported_as_well() -> None:
     places = (Pose(100, 800, 0), Pose(200, 800, 0), Pose(300, 800, 0))
-    asked = criterion("reports", expected=[["rows", 7], ["rows", 9], ["rows", 11]])
+    rule = criterion("reports", expected=[["rows", 7], ["rows", 9], ["rows", 11]])
 
-    def told(*texts: str) -> CriterionResult:
+    def judge_texts(*texts: str) -> CriterionResult:
         runs = (recorded(printed=(TimedText(1.0, text),)) for text in texts)
-        return judged(asked, *runs, poses=places)
+        return judged(rule, *runs, poses=places)
 
-    assert told("rows 7 columns 9", "columns 11, rows 9", "rows 11 of 20").marks == 4
-    assert told(*["rows 7 rows 9 rows 11"] * 3).marks == 0
-    assert told(*["rows 7 rows 9"] * 3).marks == 0
+    assert judge_texts("rows 7 columns 9", "columns 11, rows 9", "rows 11 of 20").marks == 4
+    assert judge_texts(*["rows 7 rows 9 rows 11"] * 3).marks == 0
+    assert judge_texts(*["rows 7 rows 9"] * 3).marks == 0
 
 
 def test_spinning_beside_a_point_is_no_round() -> None:
@@ -342,8 +342,8 @@ def test_spinning_beside_a_point_is_no_round() -> None:
         points = np.column_stack([450 + radius * np.cos(angles), 493 + radius * np.sin(angles)])
         return along(points, np.degrees(angles) + 90)
 
-    asked = criterion("circuits", x=450, y=493, times=[0.9, 1.1], clear_of=150)
-    assert judged(asked, circle(200)).marks == 4
-    near = judged(asked, circle(20))
+    rule = criterion("circuits", x=450, y=493, times=[0.9, 1.1], clear_of=150)
+    assert judged(rule, circle(200)).marks == 4
+    near = judged(rule, circle(20))
     assert near.marks == 0
     assert "150 mm clear of (450, 493), but its smallest distance was 20 mm" in near.message

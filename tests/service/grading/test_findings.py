@@ -83,12 +83,12 @@ def test_a_failure_has_its_values(
 
 
 def test_findings_are_by_trial_and_those_of_hidden_trials_are_left_out() -> None:
-    asked = criterion("says", in_order=["red"], only=True)
-    result = judged(asked, *(recorded(spoken=lines("red", extra)) for extra in ("left", "right")))
+    rule = criterion("says", in_order=["red"], only=True)
+    result = judged(rule, *(recorded(spoken=lines("red", extra)) for extra in ("left", "right")))
     assert result.findings == {0: (ExtraText("left"),), 1: (ExtraText("right"),)}
-    shown = remove_hidden_evidence(result, {1})
-    assert shown.findings == {1: (ExtraText("right"),)}
-    assert find_finding(shown, ExtraText) == ExtraText("right")
+    actual = remove_hidden_evidence(result, {1})
+    assert actual.findings == {1: (ExtraText("right"),)}
+    assert find_finding(actual, ExtraText) == ExtraText("right")
 
 
 def test_stored_evidence_has_the_same_form_as_before() -> None:

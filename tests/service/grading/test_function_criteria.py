@@ -68,10 +68,10 @@ def graded(text: str, runner: TrialRunner, *criteria: Criterion) -> Grade:
     ],
 )
 def test_what_a_function_returns(keys: dict[str, Any], text: str, marks: int, runner: TrialRunner) -> None:
-    asked = criterion("functions", function="f", calls=[keys])
+    rule = criterion("functions", function="f", calls=[keys])
     result = grade(
         Submission("ada", responder=SourceFile("responder.py", text)),
-        Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (asked,), limits=Limits(responder_cpu=0.5)),
+        Assignment("a", "A", WorldSpec(), Parts("none", "student"), (), (rule,), limits=Limits(responder_cpu=0.5)),
         runner=runner,
     )
     assert result.marks == marks, result.criteria[0].message
@@ -85,10 +85,10 @@ def test_calls_are_made_one_after_the_other_in_one_process(runner: TrialRunner) 
 
 
 def test_entries_of_a_list_are_marked_one_by_one(runner: TrialRunner) -> None:
-    asked = criterion("functions", function="f", calls=[{"returns": ["a", "b", "c", "d"]}], each=True, at_least=0.75)
-    assert graded("def f(): return ['a', 'b', 'c', 'x']", runner, asked).marks == 4
-    assert graded("def f(): return ['a', 'b', 'x', 'x']", runner, asked).marks == 2
-    assert graded("def f(): return ['a', 'b', 'c', 'd', 'e', 'f', 'g', 'h']", runner, asked).marks == 2
+    rule = criterion("functions", function="f", calls=[{"returns": ["a", "b", "c", "d"]}], each=True, at_least=0.75)
+    assert graded("def f(): return ['a', 'b', 'c', 'x']", runner, rule).marks == 4
+    assert graded("def f(): return ['a', 'b', 'x', 'x']", runner, rule).marks == 2
+    assert graded("def f(): return ['a', 'b', 'c', 'd', 'e', 'f', 'g', 'h']", runner, rule).marks == 2
 
 
 def test_first_wrong_call_is_told(runner: TrialRunner) -> None:
@@ -100,8 +100,8 @@ def test_first_wrong_call_is_told(runner: TrialRunner) -> None:
 
 def test_same_functions_give_the_same_values(runner: TrialRunner) -> None:
     text = "import random, time\ndef f(): return [random.random(), time.time()]"
-    asked = criterion("functions", function="f", calls=[{"returns": 0}])
-    assert graded(text, runner, asked).criteria == graded(text, runner, asked).criteria
+    rule = criterion("functions", function="f", calls=[{"returns": 0}])
+    assert graded(text, runner, rule).criteria == graded(text, runner, rule).criteria
 
 
 def test_what_the_module_prints_counts_against_its_output(runner: TrialRunner) -> None:
@@ -163,17 +163,17 @@ def test_what_is_done_with_a_hidden_argument_is_not_told(leak: str, runner: Tria
 
     def read(hidden: int) -> str:
         calls = [SQUARES[0], {"arguments": [hidden], "returns": "never", "hidden": True}]
-        found = build_student_view(graded(text, runner, criterion("functions", function="f", calls=calls)))
-        return render_json(found) + render_report_page(
-            found, {}, Submission("ada", responder=SourceFile("responder.py", text))
+        rule = build_student_view(graded(text, runner, criterion("functions", function="f", calls=calls)))
+        return render_json(rule) + render_report_page(
+            rule, {}, Submission("ada", responder=SourceFile("responder.py", text))
         )
 
     assert read(3) == read(7)
 
 
 def test_staff_read_which_hidden_call_went_wrong(runner: TrialRunner) -> None:
-    asked = criterion("functions", function="f", calls=SQUARES)
-    result = graded("def f(x): return x + x", runner, asked).criteria[0]
+    rule = criterion("functions", function="f", calls=SQUARES)
+    result = graded("def f(x): return x + x", runner, rule).criteria[0]
     assert (
         result.for_staff == "The first hidden call with a wrong result: Expected f(3) to return 9, but it returned 6."
     )
@@ -221,8 +221,8 @@ def test_accuracy_is_measured_on_what_we_pass(
 ) -> None:
     (tmp_path / "assignment.toml").write_text(_TABLE)
     (tmp_path / "letters.csv").write_text(_LETTERS)
-    asked = read_assignment(tmp_path)
-    result = grade(Submission("ada", responder=SourceFile("responder.py", text)), asked, runner=runner).criteria[0]
+    assignment = read_assignment(tmp_path)
+    result = grade(Submission("ada", responder=SourceFile("responder.py", text)), assignment, runner=runner).criteria[0]
     assert str(result.marks) == marks
     assert words in result.message
 

@@ -50,14 +50,14 @@ def _run(right: bool) -> Recording:
 def _graded(check: str, keys: Mapping[str, Any], good: int, visibility: str = "hidden") -> Grade:
     """Return a grade with two passing visible trials and 40 hidden ones, of which ``good`` pass."""
     scenarios = (Scenario("shown", (START,), trials=2), Scenario("unseen", (START,), trials=_HIDDEN))
-    asked = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), scenarios, (criterion(check, **keys),))
-    shown = [("shown", "visible", index, True) for index in range(2)]
+    assignment = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), scenarios, (criterion(check, **keys),))
+    visible_trials = [("shown", "visible", index, True) for index in range(2)]
     unseen = [("unseen", visibility, index, index < good) for index in range(_HIDDEN)]
     trials = tuple(
         TrialResult(scenario, index, 1, 0.0, 0.0, seen, _run(right), (("light_noise", 8.0 * (index % 2)),))
-        for scenario, seen, index, right in (*shown, *unseen)
+        for scenario, seen, index, right in (*visible_trials, *unseen)
     )
-    return Grade("a", "A", "1", "hash", "ada", judge(asked, trials), trials, "none", "1")
+    return Grade("a", "A", "1", "hash", "ada", judge(assignment, trials), trials, "none", "1")
 
 
 def _read_by_students(graded: Grade) -> dict[str, str]:
@@ -82,9 +82,9 @@ def test_one_hidden_trial_more_within_a_step_is_not_seen(check: str, keys: Mappi
 
 @pytest.mark.parametrize(("check", "keys"), _CRITERIA)
 def test_marks_over_hidden_trials_have_few_values(check: str, keys: Mapping[str, Any]) -> None:
-    found = {_graded(check, keys, good).marks for good in range(0, _HIDDEN + 1, 3)}
+    marks = {_graded(check, keys, good).marks for good in range(0, _HIDDEN + 1, 3)}
     steps = {Decimal(4 * step) / 20 for step in range(21)}
-    assert found <= steps
+    assert marks <= steps
     assert _graded(check, keys, _HIDDEN).marks == 4
 
 

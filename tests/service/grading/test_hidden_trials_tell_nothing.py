@@ -63,12 +63,12 @@ def criterion(check: str, keys: Mapping[str, Any]) -> Criterion:
 
 
 @pytest.fixture(scope="module")
-def asked() -> Assignment:
-    shown = Scenario("shown", POSES[:1], seconds=20, sweep=Sweep(light_noise=(8, 64)))
-    hidden = replace(shown, id="hidden", visibility="hidden", poses=POSES[2:4])
+def hidden_assignment() -> Assignment:
+    visible_scenario = Scenario("shown", POSES[:1], seconds=20, sweep=Sweep(light_noise=(8, 64)))
+    hidden = replace(visible_scenario, id="hidden", visibility="hidden", poses=POSES[2:4])
     criteria = tuple(criterion(check, keys) for check, keys in CRITERIA)
     world = WorldSpec("Shuffled_Shapes", labels=False, sheet=None)
-    return Assignment("a", "A", world, Parts(), (shown, hidden), criteria, Limits(0.5, 2.0), version="1")
+    return Assignment("a", "A", world, Parts(), (visible_scenario, hidden), criteria, Limits(0.5, 2.0), version="1")
 
 
 def students(graded: Grade, submission: Submission, plots: Mapping[str, bytes]) -> dict[str, str]:
@@ -105,8 +105,12 @@ def chosen(graded: Grade) -> list[Any]:
     ]
 
 
-def told_apart(runner: TrialRunner, submission: Submission, asked: Assignment, *, draw: bool = False) -> None:
-    first, second = (grade(submission, replace(asked, secret=secret), runner=runner) for secret in ("one", "two"))
+def told_apart(
+    runner: TrialRunner, submission: Submission, hidden_assignment: Assignment, *, draw: bool = False
+) -> None:
+    first, second = (
+        grade(submission, replace(hidden_assignment, secret=secret), runner=runner) for secret in ("one", "two")
+    )
     assert [result.marks for result in first.criteria] == [result.marks for result in second.criteria]
     # The hidden trials differ.
     assert chosen(first) != chosen(second)
@@ -183,22 +187,26 @@ def channels(known: Mapping[str, str]) -> list[Any]:
 
 
 @pytest.mark.parametrize("channel", channels(PROGRAMS))
-def test_what_a_program_does_in_hidden_trials_is_not_told(runner: TrialRunner, asked: Assignment, channel: str) -> None:
+def test_what_a_program_does_in_hidden_trials_is_not_told(
+    runner: TrialRunner, hidden_assignment: Assignment, channel: str
+) -> None:
     program = SourceFile("robot.py", f"{SEES}{PROGRAMS[channel]}\n")
-    told_apart(runner, Submission("s", program, SourceFile("responder.py", ANSWERS)), asked)
+    told_apart(runner, Submission("s", program, SourceFile("responder.py", ANSWERS)), hidden_assignment)
 
 
 @pytest.mark.parametrize("channel", channels(RESPONDERS))
 def test_what_a_responder_does_in_hidden_trials_is_not_told(
-    runner: TrialRunner, asked: Assignment, channel: str
+    runner: TrialRunner, hidden_assignment: Assignment, channel: str
 ) -> None:
     responder = SourceFile("responder.py", f"{LOOKS}{RESPONDERS[channel]}\n")
-    told_apart(runner, Submission("s", SourceFile("robot.py", SENDS), responder), asked)
+    told_apart(runner, Submission("s", SourceFile("robot.py", SENDS), responder), hidden_assignment)
 
 
 @pytest.mark.long
-def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, asked: Assignment) -> None:
-    few = replace(asked, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in asked.scenarios))
+def test_plots_for_students_are_of_visible_trials(runner: TrialRunner, hidden_assignment: Assignment) -> None:
+    few = replace(
+        hidden_assignment, scenarios=tuple(replace(each, poses=each.poses[:1]) for each in hidden_assignment.scenarios)
+    )
     responder = SourceFile("responder.py", LOOKS + RESPONDERS["which answers are given"])
     told_apart(runner, Submission("s", SourceFile("robot.py", SENDS), responder), few, draw=True)
 
@@ -214,9 +222,9 @@ CELLS = (
 )
 
 
-def test_what_the_cells_after_a_hidden_run_do_is_not_told(runner: TrialRunner, asked: Assignment) -> None:
+def test_what_the_cells_after_a_hidden_run_do_is_not_told(runner: TrialRunner, hidden_assignment: Assignment) -> None:
     cells = tuple(Cell(number, source) for number, source in enumerate(CELLS, 1))
-    told_apart(runner, Submission("s", notebook=Notebook("work.ipynb", cells)), asked)
+    told_apart(runner, Submission("s", notebook=Notebook("work.ipynb", cells)), hidden_assignment)
 
 
 #: Trained on visible images, then asked about visible and hidden ones in one process.
@@ -240,13 +248,13 @@ def train(images, labels):
 
 @pytest.fixture(scope="module")
 def training() -> Assignment:
-    found = find_assignment("train-a-recogniser")
-    scenarios = tuple(replace(scenario, trials=1) for scenario in found.scenarios)
-    criteria = tuple(each.model_copy(update={"marks": Decimal(0)}) for each in found.criteria)
+    assignment = find_assignment("train-a-recogniser")
+    scenarios = tuple(replace(scenario, trials=1) for scenario in assignment.scenarios)
+    criteria = tuple(each.model_copy(update={"marks": Decimal(0)}) for each in assignment.criteria)
     pooled = criteria[0].model_copy(update={"id": "all", "scenarios": ("practice", "unseen")})
-    assert isinstance(found.training, Training)
-    limits = replace(found.limits, responder_cpu=0.5)
-    return replace(found, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
+    assert isinstance(assignment.training, Training)
+    limits = replace(assignment.limits, responder_cpu=0.5)
+    return replace(assignment, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
 
 
 @pytest.mark.parametrize(
@@ -262,9 +270,9 @@ def test_what_a_model_does_with_hidden_images_is_not_told(
 def _with_hidden(count: int, *, first: bool) -> Assignment:
     """Return the echo assignment with four visible trials, and ``count`` hidden ones before or after them."""
     (own,) = echo().scenarios
-    shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)))
+    visible_scenario = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)))
     hidden = tuple(replace(own, id=f"secret-{number}", visibility="hidden") for number in range(count))
-    return replace(echo(), scenarios=(*hidden, shown) if first else (shown, *hidden))
+    return replace(echo(), scenarios=(*hidden, visible_scenario) if first else (visible_scenario, *hidden))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -289,11 +297,11 @@ def test_visible_trials_may_compute_as_long_however_many_are_hidden(
             super().charge_child(cpu_seconds, sleep_seconds)
 
     monkeypatch.setattr(grader, "JobMeter", Watched)
-    found = {}
+    verdicts = {}
     for count in (1, 3):
         limits.clear()
         graded = grade(grading_request().submission, _with_hidden(count, first=True), runner=runner)
         assert graded.cost is not None
-        found[count] = (limits[0], graded.cost.limits.cpu_seconds - limits[0])
-    assert found[1][0] == found[3][0]
-    assert (found[1][1], found[3][1]) == (1, 3)
+        verdicts[count] = (limits[0], graded.cost.limits.cpu_seconds - limits[0])
+    assert verdicts[1][0] == verdicts[3][0]
+    assert (verdicts[1][1], verdicts[3][1]) == (1, 3)

@@ -90,8 +90,8 @@ def written(case: Mapping[str, Any], folder: Path) -> Path:
 
 
 def graded_case(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> Grade:
-    asked = asked_in(case["assignment"], folder)
-    return grade(read_submission(written(case, folder), required_parts=asked.parts), asked, runner=runner)
+    assignment = asked_in(case["assignment"], folder)
+    return grade(read_submission(written(case, folder), required_parts=assignment.parts), assignment, runner=runner)
 
 
 @pytest.mark.parametrize("case", NEAR_MISSES, ids=lambda case: case["name"])
@@ -119,15 +119,18 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
     cause, criterion = 'prints "py::0"', graded.criteria[0].title
     assert cause in hint
     row = TableRow(Student("ada"), "ada.zip", graded.assignment, graded)
-    shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(render_rich_report(build_staff_view(graded)))
-    told = {"terminal": shown.export_text(), "page": unescape(render_report_page(build_student_view(graded), {}))}
+    console = Console(width=400, record=True, file=io.StringIO())
+    console.print(render_rich_report(build_staff_view(graded)))
+    documents = {
+        "terminal": console.export_text(),
+        "page": unescape(render_report_page(build_student_view(graded), {})),
+    }
     for name, form in FORMATS.items():
         if form.document is not None:
-            told[f"{name} document"] = unescape(form.document(graded)).replace('\\"', '"')
+            documents[f"{name} document"] = unescape(form.document(graded)).replace('\\"', '"')
         if form.table is not None:
-            told[f"{name} table"] = unescape(form.table([row])).replace('\\"', '"').replace('""', '"')
-    for name, text in told.items():
+            documents[f"{name} table"] = unescape(form.table([row])).replace('\\"', '"').replace('""', '"')
+    for name, text in documents.items():
         assert cause in text, name
         if name not in ("csv table", "csv-long table"):
             # Tables have their own columns and order.
@@ -136,12 +139,14 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
 
 def test_a_hint_tells_nothing_of_hidden_trials_and_criteria(runner: TrialRunner, tmp_path: Path) -> None:
     case = one_like("py in small letters")
-    asked = asked_in(case["assignment"], tmp_path)
-    submission = read_submission(written(case, tmp_path), required_parts=asked.parts)
-    hidden_trials = replace(asked, scenarios=tuple(replace(each, visibility="hidden") for each in asked.scenarios))
+    assignment = asked_in(case["assignment"], tmp_path)
+    submission = read_submission(written(case, tmp_path), required_parts=assignment.parts)
+    hidden_trials = replace(
+        assignment, scenarios=tuple(replace(each, visibility="hidden") for each in assignment.scenarios)
+    )
     assert grade(submission, hidden_trials, runner=runner).hints == ()
-    criteria = tuple(each.model_copy(update={"visibility": "hidden"}) for each in asked.criteria)
-    assert grade(submission, replace(asked, criteria=criteria), runner=runner).hints == ()
+    criteria = tuple(each.model_copy(update={"visibility": "hidden"}) for each in assignment.criteria)
+    assert grade(submission, replace(assignment, criteria=criteria), runner=runner).hints == ()
 
 
 def test_what_costs_nothing_is_no_cause(runner: TrialRunner, tmp_path: Path) -> None:
@@ -173,13 +178,13 @@ CELLS = {
 @pytest.mark.parametrize("name", CELLS)
 def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_path: Path) -> None:
     cells, hint = CELLS[name]
-    asked = find_assignment("echo-responder")
-    submission = read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=asked.parts)
-    assert grade(submission, asked, runner=runner).hints[0].startswith(hint)
+    assignment = find_assignment("echo-responder")
+    submission = read_submission(notebook(tmp_path / "ada.ipynb", cells), required_parts=assignment.parts)
+    assert grade(submission, assignment, runner=runner).hints[0].startswith(hint)
 
 
 @pytest.mark.parametrize(
-    ("cell", "found"),
+    ("cell", "near_miss"),
     [
         ("%%sim_magic_preload\nprint(1)", "line 1 of cell 1 has %%sim_magic_preload, another word."),
         (
@@ -189,11 +194,13 @@ def test_in_a_notebook_the_cell_is_named(name: str, runner: TrialRunner, tmp_pat
         ("print(1)", "begins with %%sim_magic_preloaded."),
     ],
 )
-def test_a_notebook_without_a_robot_program_is_told_what_was_nearly_one(cell: str, found: str, tmp_path: Path) -> None:
-    asked = find_assignment("echo-responder")
+def test_a_notebook_without_a_robot_program_is_told_what_was_nearly_one(
+    cell: str, near_miss: str, tmp_path: Path
+) -> None:
+    assignment = find_assignment("echo-responder")
     with pytest.raises(UsageError) as refusal:
-        read_submission(notebook(tmp_path / "ada.ipynb", [cell]), required_parts=asked.parts)
-    assert str(refusal.value).endswith(found)
+        read_submission(notebook(tmp_path / "ada.ipynb", [cell]), required_parts=assignment.parts)
+    assert str(refusal.value).endswith(near_miss)
 
 
 def test_files_with_other_names_are_to_be_renamed(tmp_path: Path) -> None:
@@ -225,12 +232,12 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
         text = "".join(f"print('P Y : :{number}' * 2)  # {'x(' * 40}\n" for number in range(lines))
         (tmp_path / "robot.py").write_text(text)
         (tmp_path / "responder.py").write_text("def responder(text):\n" + "    print(text)\n" * lines)
-        asked = find_assignment("echo-responder")
-        submission = read_submission(tmp_path, required_parts=asked.parts)
-        clues = collect_clues(submission, plan_run(submission, asked), (), ())
-        said = tuple(TimedText(0.0, f"P Y : :{number}") for number in range(lines))
-        recording = replace(line_follower_recording(1), printed=said, spoken=said)
-        lost = tuple(each for each in asked.criteria)
+        assignment = find_assignment("echo-responder")
+        submission = read_submission(tmp_path, required_parts=assignment.parts)
+        clues = collect_clues(submission, plan_run(submission, assignment), (), ())
+        speech = tuple(TimedText(0.0, f"P Y : :{number}") for number in range(lines))
+        recording = replace(line_follower_recording(1), printed=speech, spoken=speech)
+        lost = tuple(each for each in assignment.criteria)
         began = time.process_time()
         collect_near_misses(replace(clues, recordings=(recording,), lost=lost))
         return time.process_time() - began
@@ -242,14 +249,14 @@ def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Pat
 def test_a_rule_that_fails_is_logged_and_the_others_give_their_hints(
     runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    asked = find_assignment("echo-responder")
-    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=asked.parts)
-    whole = grade(submission, asked, runner=runner)
+    assignment = find_assignment("echo-responder")
+    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=assignment.parts)
+    whole = grade(submission, assignment, runner=runner)
     assert whole.hints
     for rules in ("_FILE_RULES", "_ERROR_RULES", "_RESULT_RULES", "_FALLBACK_RULES"):
         others = getattr(hints, rules)
         monkeypatch.setattr(hints, rules, (_raises, *others))
-    assert grade(submission, asked, runner=runner).hints == whole.hints
+    assert grade(submission, assignment, runner=runner).hints == whole.hints
     causes = {(each.message, str(each.exc_info[1])) for each in caplog.records if each.exc_info}
     assert causes == {("_raises failed, so it gives no hint", "a rule that nobody thought through")}
 
@@ -286,8 +293,8 @@ def test_a_criterion_that_only_hidden_trials_fail_leaves_all_rules_working(
 ) -> None:
     (tmp_path / "assignment.toml").write_text(HIDDEN_TURN)
     (tmp_path / "robot.py").write_text("tank_drive.on_for_seconds(SpeedPercent(30), SpeedPercent(30), 2.44)\n")
-    asked = find_assignment(str(tmp_path))
-    graded = grade(read_submission(tmp_path / "robot.py", required_parts=asked.parts), asked, runner=runner)
+    assignment = find_assignment(str(tmp_path))
+    graded = grade(read_submission(tmp_path / "robot.py", required_parts=assignment.parts), assignment, runner=runner)
     assert 0 < graded.marks < graded.max_marks
     assert [bool(each.recording.places) for each in graded.trials] == [True, False]
     assert not caplog.records
@@ -307,12 +314,12 @@ def _never_ends(_: object) -> tuple[str, ...]:
 def test_rules_that_fail_cost_neither_marks_nor_the_job(
     rules: Callable[[object], tuple[str, ...]], little: bool, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = find_assignment("echo-responder")
-    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=asked.parts)
-    whole = grade(submission, asked, runner=runner)
+    assignment = find_assignment("echo-responder")
+    submission = read_submission(locate_examples("echo-responder") / "flawed", required_parts=assignment.parts)
+    whole = grade(submission, assignment, runner=runner)
     monkeypatch.setattr("service.grading.hints.collect_near_misses", rules)
     monkeypatch.setattr(limited_judging, "_SMALL_LIMITS", replace(limited_judging._SMALL_LIMITS, cpu_seconds=0.1))
     if not little:
         monkeypatch.setattr(limited_judging, "_SMALL_INPUT", -1)
-    without = grade(submission, asked, runner=runner)
+    without = grade(submission, assignment, runner=runner)
     assert (without.marks, without.hints) == (whole.marks, ())

@@ -52,7 +52,7 @@ def test_finishing_late_and_what_is_said_of_a_fault() -> None:
 
 
 @pytest.mark.parametrize(
-    ("keys", "said", "passes"),
+    ("keys", "spoken_texts", "passes"),
     [
         ({"equals": "all done"}, ["a", " all  done "], True),
         ({"equals": "all done"}, ["All done"], False),
@@ -84,16 +84,16 @@ def test_finishing_late_and_what_is_said_of_a_fault() -> None:
     ],
 )
 @pytest.mark.parametrize("check", ["prints", "says"])
-def test_texts_are_found(check: str, keys: dict[str, Any], said: list[str], passes: bool) -> None:
+def test_texts_are_found(check: str, keys: dict[str, Any], spoken_texts: list[str], passes: bool) -> None:
     field = {"prints": "printed", "says": "spoken"}[check]
-    result = judged(criterion(check, **keys), recorded(**{field: lines(*said)}))
+    result = judged(criterion(check, **keys), recorded(**{field: lines(*spoken_texts)}))
     assert result.marks == (4 if passes else 0), result.message
 
 
 def test_reached_part_of_an_order_counts_with_mean() -> None:
-    asked = criterion("says", in_order=["1", "2", "3", "4"], over="mean")
+    rule = criterion("says", in_order=["1", "2", "3", "4"], over="mean")
     cut = recorded(spoken=lines("1", "2", "3"), verdict=Verdict.TIME_LIMIT)
-    result = judged(asked, cut)
+    result = judged(rule, cut)
     assert result.marks == 3
     assert (
         '"4" did not come after "3" (3 of 4 found). The program was still running when time ran out, at 3 s.'
@@ -130,13 +130,13 @@ def test_messages_in_the_queue_by_path() -> None:
 
 
 def test_queue_grows_only_by_json_that_arrives_in_order() -> None:
-    asked = criterion("messages", queue_grows=True, over="mean")
+    rule = criterion("messages", queue_grows=True, over="mean")
     good = talk(("PY::0", 'JSON::{"message": 0}'), ("PY::2", "JSON::1"))
-    assert judged(asked, recorded(messages=good)).marks == 4
-    plain = judged(asked, recorded(messages=talk(("PY::0", "JSON::0"), ("PY::2", "hello"))))
+    assert judged(rule, recorded(messages=good)).marks == 4
+    plain = judged(rule, recorded(messages=talk(("PY::0", "JSON::0"), ("PY::2", "hello"))))
     assert plain.marks == 2
     assert '"PY::2" was answered with "hello" (1 of 2 in the queue)' in plain.message
-    late = judged(asked, recorded(messages=talk(("PY::0", "JSON::0"), arrives=False)))
+    late = judged(rule, recorded(messages=talk(("PY::0", "JSON::0"), arrives=False)))
     assert "only after the program had ended" in late.message
     swapped = (
         Message(0, "robot", "PY::0", 0),
@@ -147,9 +147,9 @@ def test_queue_grows_only_by_json_that_arrives_in_order() -> None:
     disorder = judged(criterion("messages", queue_grows=True), recorded(messages=swapped))
     assert disorder.marks == 0
     assert "another order" in disorder.message
-    assert judged(asked, recorded()).marks == 0
+    assert judged(rule, recorded()).marks == 0
     lost = (*good, Message(2, "robot", "PY::3", None, note="lost"))
-    assert judged(asked, recorded(messages=lost)).marks == 4
+    assert judged(rule, recorded(messages=lost)).marks == 4
     both = criterion("messages", queue_grows=True, exactly=3)
     assert "exactly 3 times" in judged(both, recorded(messages=good)).message
 
@@ -181,9 +181,9 @@ def test_replies_are_compared(keys: dict[str, Any], answer: str | None, passes: 
 
 
 def test_undelivered_replies_count_and_the_share_answered_with_mean() -> None:
-    asked = criterion("replies", contains="saw", over="mean")
+    rule = criterion("replies", contains="saw", over="mean")
     run = recorded(messages=talk(("PY::0", "saw"), ("PY::1", "said"), arrives=False))
-    result = judged(asked, run)
+    result = judged(rule, run)
     assert result.marks == 2
     assert (
         'at 1.00 s: Expected the responder to answer "PY::1" with something that contains "saw", '

@@ -179,10 +179,10 @@ path = "0.0"
 def test_hostile_programs_are_graded_in_little_time(name: str, runner: TrialRunner, tmp_path: Path) -> None:
     (tmp_path / "assignment.toml").write_text(_HARD_ASSIGNMENT)
     (tmp_path / "echo.py").write_text("def responder(text):\n    return text[4:]\n")
-    asked = read_assignment(tmp_path)
+    assignment = read_assignment(tmp_path)
     program = SourceFile("robot.py", _STORY.format(lines=_PROGRAMS[name]))
     begin = time.process_time()
-    graded = grade(Submission("ada", program, None), asked, runner=runner)
+    graded = grade(Submission("ada", program, None), assignment, runner=runner)
     assert time.process_time() - begin < 30
     assert graded.verdict in (Verdict.FINISHED, Verdict.PROTOCOL_ERROR)
     marks = {result.id: result.marks for result in graded.criteria}
@@ -315,10 +315,10 @@ def _criteria(*ids: str) -> Assignment:
 
 
 def _spoil(monkeypatch: pytest.MonkeyPatch, spoilt: Mapping[str, Callable[[], None]]) -> None:
-    def judge_or_not(asked: Any, *rest: Any) -> CriterionResult:
-        if asked.id in spoilt:
-            spoilt[asked.id]()
-        return judge_one(asked, *rest)
+    def judge_or_not(criterion: Any, *rest: Any) -> CriterionResult:
+        if criterion.id in spoilt:
+            spoilt[criterion.id]()
+        return judge_one(criterion, *rest)
 
     monkeypatch.setattr(limited_judging, "judge_one", judge_or_not)
     monkeypatch.setattr(limited_judging, "_SMALL_LIMITS", replace(_SMALL, cpu_seconds=0.2, seconds=0.5))
@@ -374,10 +374,10 @@ def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> 
     messages = (Message(0, "robot", "IMG_DATA::{}", 0), Message(0, "responder", "a", 0.1, 0))
     images = tuple(Image(n / 2, 15 * n, START, bytes([n]) * 1600, bytes(1600), 0, "a") for n in range(3))
     run = recorded(messages=messages, images=images)
-    asked = _asking(criterion("classification", labels=["a"]))
-    plain = judge(asked, _trials(run))
+    rule = _asking(criterion("classification", labels=["a"]))
+    plain = judge(rule, _trials(run))
     monkeypatch.setattr(limited_judging, "_SMALL_INPUT", -1)
-    apart = judge_within_limits(_SMALL, asked, _trials(run), StaticAnalysis())
+    apart = judge_within_limits(_SMALL, rule, _trials(run), StaticAnalysis())
     assert apart == plain
     assert [prediction.image is image for prediction, image in zip(apart[0].predictions, images, strict=True)] == [
         True
@@ -424,6 +424,6 @@ def test_a_grade_says_that_staff_have_to_look(
 
 def test_of_one_message_only_the_first_calls_are_drawn() -> None:
     calls = tuple(Call(0, n % 1000, "responder", "parser", "a", "b") for n in range(10_000))
-    told = build_conversation(recorded(messages=(Message(0, "robot", "PY::0", 0),), calls=calls))
-    assert len(told.steps) < MAX_CALL_STEPS + 5
-    assert sum(step.count for step in told.steps if isinstance(step, Gap)) == 20_000 - MAX_CALL_STEPS
+    message = build_conversation(recorded(messages=(Message(0, "robot", "PY::0", 0),), calls=calls))
+    assert len(message.steps) < MAX_CALL_STEPS + 5
+    assert sum(step.count for step in message.steps if isinstance(step, Gap)) == 20_000 - MAX_CALL_STEPS

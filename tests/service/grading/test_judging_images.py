@@ -22,9 +22,10 @@ SQUARE, DIAMOND = "square", "diamond"
 
 def imaged(truth: str | None, answer: str | None, *, spoken: str = "", count: int = 1) -> Recording:
     messages = talk(*[("IMG_DATA::{}", answer)] * count)
-    asked = [index for index, message in enumerate(messages) if message.sender == "robot"]
+    robot_indices = [index for index, message in enumerate(messages) if message.sender == "robot"]
     images = tuple(
-        Image(float(t), 30 * t, Pose(100 + 30 * t, 800, 0), b"", b"", index, truth) for t, index in enumerate(asked)
+        Image(float(t), 30 * t, Pose(100 + 30 * t, 800, 0), b"", b"", index, truth)
+        for t, index in enumerate(robot_indices)
     )
     return recorded(
         background="Simple_Shapes", messages=messages, images=images, spoken=lines(spoken) if spoken else ()
@@ -50,8 +51,8 @@ def imaged(truth: str | None, answer: str | None, *, spoken: str = "", count: in
     ],
 )
 def test_what_an_answer_names(answer: str | None, right: bool) -> None:
-    asked = criterion("classification", answer="message.shape", aliases={"upwards facing triangle": ["up triangle"]})
-    result = judged(asked, imaged("upwards facing triangle", answer))
+    rule = criterion("classification", answer="message.shape", aliases={"upwards facing triangle": ["up triangle"]})
+    result = judged(rule, imaged("upwards facing triangle", answer))
     assert result.marks == (4 if right else 0), result.message
     assert result.accuracy is not None
     assert result.accuracy.n == 1
@@ -88,18 +89,18 @@ def test_which_images_count(images: str, count: int) -> None:
 
 
 def test_truth_told_for_each_pose() -> None:
-    asked = criterion("classification", truth=["Three", "four"], aliases={"Three": ["3"], "four": ["4"]})
+    rule = criterion("classification", truth=["Three", "four"], aliases={"Three": ["3"], "four": ["4"]})
     poses = (START, Pose(200, 800, 0))
-    result = judged(asked, imaged(None, "it is a 3"), imaged(None, "3"), poses=poses)
+    result = judged(rule, imaged(None, "it is a 3"), imaged(None, "3"), poses=poses)
     assert result.marks == 2
-    silent = judged(asked, imaged(None, "3"), recorded(background="Simple_Shapes"), poses=poses)
+    silent = judged(rule, imaged(None, "3"), recorded(background="Simple_Shapes"), poses=poses)
     assert ("four", None, 1) in (silent.accuracy.confusion if silent.accuracy else ())
 
 
 def test_what_the_robot_says_can_be_the_answer() -> None:
-    asked = criterion("classification", answer_from="speech")
-    assert judged(asked, imaged(SQUARE, None, spoken="Is that a square")).marks == 4
-    assert "said nothing after the image" in judged(asked, imaged(SQUARE, "square")).message
+    rule = criterion("classification", answer_from="speech")
+    assert judged(rule, imaged(SQUARE, None, spoken="Is that a square")).marks == 4
+    assert "said nothing after the image" in judged(rule, imaged(SQUARE, "square")).message
 
 
 @pytest.mark.parametrize(
@@ -112,25 +113,25 @@ def test_wilson_interval(right: int, count: int, low: float, high: float) -> Non
 
 
 def test_hidden_trials_are_counted_but_not_told() -> None:
-    for asked in (criterion("says", equals="secret"), criterion("classification")):
-        result = judged(asked, imaged(SQUARE, "diamond", spoken="no"), recorded(), visibility="hidden")
+    for each in (criterion("says", equals="secret"), criterion("classification")):
+        result = judged(each, imaged(SQUARE, "diamond", spoken="no"), recorded(), visibility="hidden")
         assert "scenario s" in result.message  # for staff
         assert result.shown == VisibleFeedback("Marked in trials that are not shown.")
 
 
 def test_of_a_criterion_with_hidden_trials_only_the_visible_ones_are_told() -> None:
-    asked, wrong = criterion("says", equals="secret"), recorded(spoken=(TimedText(1.0, "469"),))
+    rule, wrong = criterion("says", equals="secret"), recorded(spoken=(TimedText(1.0, "469"),))
     scenarios = (Scenario("s", (START,)), Scenario("t", (START,), visibility="hidden"))
-    assignment = Assignment("a", "A", WorldSpec(), Parts(), scenarios, (asked,))
-    told = []
+    assignment = Assignment("a", "A", WorldSpec(), Parts(), scenarios, (rule,))
+    messages = []
     for recording in (wrong, recorded(spoken=(TimedText(1.0, "secret"),))):
-        shown = TrialResult("s", 0, 1, 0, 0, "visible", recorded(spoken=(TimedText(1.0, "secret"),)))
-        (result,) = judge(assignment, (shown, TrialResult("t", 0, 1, 0, 0, "hidden", recording)))
+        speech = TrialResult("s", 0, 1, 0, 0, "visible", recorded(spoken=(TimedText(1.0, "secret"),)))
+        (result,) = judge(assignment, (speech, TrialResult("t", 0, 1, 0, 0, "hidden", recording)))
         assert ("469" in result.message) is (recording is wrong)
-        told.append(result.shown)
-    assert told[0] == told[1]
-    assert told[0] is not None
-    assert told[0].message.endswith("Trials that are not shown are marked as well.")
+        messages.append(result.shown)
+    assert messages[0] == messages[1]
+    assert messages[0] is not None
+    assert messages[0].message.endswith("Trials that are not shown are marked as well.")
 
 
 def test_trial_that_the_host_spoilt_is_not_marked() -> None:

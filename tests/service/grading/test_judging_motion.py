@@ -120,10 +120,12 @@ def test_forwards_and_backwards_left_and_right_are_moves_of_their_own(made: Any,
 )
 def test_moves_are_paired_so_that_most_are_found(keys: dict[str, Any], made: Sequence[float], marks: float) -> None:
     wide, narrow = {"forward": [50, 300]}, {"forward": [50, 100]}
-    asked = [{"forward": [190, 210]}, {"forward": [70, 90]}, {"forward": [keys["then"]] * 2}] if "then" in keys else []
+    required_moves = (
+        [{"forward": [190, 210]}, {"forward": [70, 90]}, {"forward": [keys["then"]] * 2}] if "then" in keys else []
+    )
     keys = {key: value for key, value in keys.items() if key != "then"}
     run = driven(*(part for mm in made for part in (straight(mm), rest())))
-    result = judged(criterion("moves", moves=asked or [wide, narrow], over="mean", **keys), run)
+    result = judged(criterion("moves", moves=required_moves or [wide, narrow], over="mean", **keys), run)
     assert float(result.marks) == marks, result.message
 
 
@@ -176,7 +178,7 @@ def test_an_excursion_without_a_return_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("heights", "moves", "score", "told"),
+    ("heights", "moves", "score", "expected_words"),
     [
         ([1], (straight(100),), 0.5, "it ended 100 mm from it"),
         ([1, 1], (straight(100), straight(-100), straight(100)), 0.75, "it ended 100 mm from it"),
@@ -192,11 +194,13 @@ def test_an_excursion_without_a_return_is_told() -> None:
         ),
     ],
 )
-def test_each_excursion_comes_back_to_the_start(heights: list[int], moves: Any, score: float, told: str) -> None:
-    asked = criterion("excursions", heights=heights, over="mean")
-    result = judged(asked, driven(*moves))
+def test_each_excursion_comes_back_to_the_start(
+    heights: list[int], moves: Any, score: float, expected_words: str
+) -> None:
+    rule = criterion("excursions", heights=heights, over="mean")
+    result = judged(rule, driven(*moves))
     assert float(result.marks) == 4 * score, result.message
-    assert told in result.message
+    assert expected_words in result.message
 
 
 @given(st.lists(st.sampled_from((1, 2, 3)), min_size=1, max_size=5), st.sampled_from((60, 100)))
@@ -226,8 +230,8 @@ def test_encounters_are_answered_in_order_and_in_time(after: Any, good: bool) ->
     moves = (straight(100), *after)
     count = sum(ticks for _, _, ticks in moves)
     run = driven(*moves, rgb=seeing(range(18, 22), count))
-    asked = criterion("encounters", light="left", below=40, then=["reverse", "turn"], seconds=3)
-    assert passes(asked, run) is good
+    rule = criterion("encounters", light="left", below=40, then=["reverse", "turn"], seconds=3)
+    assert passes(rule, run) is good
 
 
 def test_an_unanswered_encounter_is_pointed_at() -> None:
@@ -267,10 +271,10 @@ def test_squares(moves: list[Any], keys: dict[str, Any], good: bool) -> None:
 
 
 def test_what_is_wrong_with_a_drawing_is_told() -> None:
-    asked = criterion("drawing", legs=4, closes=True)
-    assert "no -p" in judged(asked, driven(*square(200), pen=())).message
-    assert "after leg 1 the robot turned 99.0°" in judged(asked, driven(*square(200, 99))).message
-    assert "Expected 4 straight legs, but the path has none." in judged(asked, driven()).message
+    rule = criterion("drawing", legs=4, closes=True)
+    assert "no -p" in judged(rule, driven(*square(200), pen=())).message
+    assert "after leg 1 the robot turned 99.0°" in judged(rule, driven(*square(200, 99))).message
+    assert "Expected 4 straight legs, but the path has none." in judged(rule, driven()).message
     open_square = [straight(200), spin(90), straight(200), spin(90), straight(200), spin(90), straight(160)]
     gap = judged(criterion("drawing", legs=4, closes=True, equal_within=0.3), driven(*open_square))
     assert "the end is 40 mm away" in gap.message
@@ -347,8 +351,8 @@ def test_regular_polygons_are_recognised_in_any_direction(sides: int, side: int,
 
 
 def test_spread_tells_each_level_of_noise() -> None:
-    asked = criterion("spread", x=200, y=800)
-    result = judged(asked, driven(straight(100)), driven(straight(140)), motor_noise=20)
+    rule = criterion("spread", x=200, y=800)
+    result = judged(rule, driven(straight(100)), driven(straight(140)), motor_noise=20)
     assert result.marks == 4
     assert result.message == (
         "The robot ended at these distances from (200, 800): with motor noise 20 0 to 40 mm (mean 20, 2 runs)."

@@ -48,13 +48,13 @@ def test_a_bar_without_length_is_a_circle(point: tuple[float, float], radius: fl
 def test_a_rectangle_is_a_polygon_whichever_way_round(point: tuple[float, float]) -> None:
     rectangle = Area(rectangle=(-100, -50, 200, 80))
     corners = ((-100, -50), (200, -50), (200, 80), (-100, 80))
-    here = np.array([point])
+    position = np.array([point])
     for turned in (corners, corners[::-1], corners[2:] + corners[:2]):
-        assert measure_area_distance(Area(polygon=turned), here) == pytest.approx(
-            measure_area_distance(rectangle, here)
+        assert measure_area_distance(Area(polygon=turned), position) == pytest.approx(
+            measure_area_distance(rectangle, position)
         )
     inside = -100 < point[0] < 200 and -50 < point[1] < 80
-    assert (measure_area_distance(rectangle, here)[0] < 0) == inside
+    assert (measure_area_distance(rectangle, position)[0] < 0) == inside
 
 
 @given(points, st.floats(0, 2 * math.pi))
@@ -109,8 +109,8 @@ NEAR, FAR = {"name": "the near place", "circle": [300, 800, 30]}, {"name": "the 
 )
 def test_visits(keys: dict[str, Any], marks: float) -> None:
     run = driven(straight(400), rest(20), straight(100))
-    asked = criterion("visits", over="mean", **keys)
-    result = judged(asked, run)
+    rule = criterion("visits", over="mean", **keys)
+    result = judged(rule, run)
     assert float(result.marks) == pytest.approx(marks, abs=0.05), result.message
 
 
@@ -133,14 +133,14 @@ def test_as_many_places_in_order_as_an_exhaustive_search_finds(wished: list[str]
 
 
 def test_stopping_at_the_end_is_stopping() -> None:
-    asked = criterion("visits", places=[FAR], without_stopping=True)
-    assert "not to stop in the far place" in judged(asked, driven(straight(500))).message
+    rule = criterion("visits", places=[FAR], without_stopping=True)
+    assert "not to stop in the far place" in judged(rule, driven(straight(500))).message
 
 
 def test_leaving_an_area_is_told_with_where_and_how_far() -> None:
-    asked = criterion("stays_inside", areas=[{"name": "the loop", "rectangle": [0, 700, 400, 900]}])
-    assert passes(asked, driven(straight(300)))
-    result = judged(asked, driven(straight(350), straight(-200)))
+    rule = criterion("stays_inside", areas=[{"name": "the loop", "rectangle": [0, 700, 400, 900]}])
+    assert passes(rule, driven(straight(300)))
+    result = judged(rule, driven(straight(350), straight(-200)))
     assert "at 2.03 s: Expected the robot to stay in the loop, but it left it at (405, 800)" in result.message
     assert measured(result, "farthest out") == pytest.approx(50)
     assert measured(result, "greatest x") == pytest.approx(450)
@@ -148,9 +148,9 @@ def test_leaving_an_area_is_told_with_where_and_how_far() -> None:
 
 def test_standing_still_earns_nothing_where_driving_is_asked() -> None:
     for check, area in (("stays_inside", [0, 0, 2362, 1143]), ("keeps_out", [0, 0, 1, 1])):
-        asked = criterion(check, areas=[{"rectangle": area}], drives=300)
-        assert passes(asked, driven(straight(150), straight(-150)))
-        assert "to drive 300 mm or more, but it drove only 0 mm" in judged(asked, driven(rest())).message
+        rule = criterion(check, areas=[{"rectangle": area}], drives=300)
+        assert passes(rule, driven(straight(150), straight(-150)))
+        assert "to drive 300 mm or more, but it drove only 0 mm" in judged(rule, driven(rest())).message
 
 
 def test_several_areas_are_one() -> None:
@@ -160,12 +160,12 @@ def test_several_areas_are_one() -> None:
 
 
 def test_the_pen_may_be_lifted_over_a_bar() -> None:
-    asked = criterion("keeps_out", of="pen", areas=[{"name": "the bar", "bar": [300, 700, 300, 900, 20]}])
+    rule = criterion("keeps_out", of="pen", areas=[{"name": "the bar", "bar": [300, 700, 300, 900, 20]}])
     run = driven(straight(400))
-    assert "Expected the pen to stay out of the bar" in judged(asked, run).message
+    assert "Expected the pen to stay out of the bar" in judged(rule, run).message
     lifted = driven(straight(400), pen=((0, True), (20, False), (60, True)))
-    assert passes(asked, lifted)
-    assert "has no -p" in judged(asked, driven(straight(400), pen=())).message
+    assert passes(rule, lifted)
+    assert "has no -p" in judged(rule, driven(straight(400), pen=())).message
 
 
 def test_touches() -> None:
@@ -279,8 +279,8 @@ STRETCH = {"points": [[300, 300], [1300, 300]]}
     ],
 )
 def test_an_open_line_is_followed_from_its_beginning(run: Any, keys: dict[str, Any], share: float) -> None:
-    asked = criterion("follows", line=STRETCH, covers=0.999, over="mean", **keys)
-    result = judged(asked, run)
+    rule = criterion("follows", line=STRETCH, covers=0.999, over="mean", **keys)
+    result = judged(rule, run)
     assert measured(result, "share covered") == pytest.approx(share, abs=0.001)
     assert result.evidence[0].passed is (share == 1)
 
@@ -332,11 +332,11 @@ def test_what_is_driven_of_a_circle_is_covered(part: float, off: float, way: int
     course = LineToFollow(ellipse=(0, 0, 300, 300))
     angles = np.linspace(0, part * 2 * math.pi, 300)
     radius = 300 + way * off
-    found = along_line(course, radius * np.column_stack([np.cos(angles), np.sin(angles)]), 50)
-    assert found is not None
-    assert measure_covered_share(found, 50, 0, found.length) == pytest.approx(part, abs=0.01)
-    assert np.abs(found.offset).max() == pytest.approx(off if way else 0, abs=0.2)
-    assert found.length == pytest.approx(2 * math.pi * 300, rel=1e-3)
+    line_progress = along_line(course, radius * np.column_stack([np.cos(angles), np.sin(angles)]), 50)
+    assert line_progress is not None
+    assert measure_covered_share(line_progress, 50, 0, line_progress.length) == pytest.approx(part, abs=0.01)
+    assert np.abs(line_progress.offset).max() == pytest.approx(off if way else 0, abs=0.2)
+    assert line_progress.length == pytest.approx(2 * math.pi * 300, rel=1e-3)
 
 
 def circling(laps: float, seconds_a_lap: float, off: float = 0.0) -> Any:
@@ -371,7 +371,7 @@ def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bo
     crossings = [Crossing(float(row), row, float(at)) for row, at in enumerate(progress)]
     offsets = np.zeros((len(progress) - 1) * 2 + 1)
     offsets[1::2] = [100 if leaves else 0 for _, leaves in ways]
-    found = LineProgress(0, np.repeat(progress, 2)[:-1], offsets, 1000)
+    line_progress = LineProgress(0, np.repeat(progress, 2)[:-1], offsets, 1000)
     crossings = [Crossing(each.t, 2 * each.row, each.progress) for each in crossings]
     clean = [
         (first.t, last.t)
@@ -384,9 +384,9 @@ def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bo
         for chosen in itertools.combinations(clean, size)
         if all(one[1] <= other[0] for one, other in itertools.pairwise(sorted(chosen)))
     )
-    asked = criterion("laps", **CIRCUIT)
-    assert isinstance(asked, Laps)
-    laps, _ = find_complete_laps(asked, found, crossings)
+    rule = criterion("laps", **CIRCUIT)
+    assert isinstance(rule, Laps)
+    laps, _ = find_complete_laps(rule, line_progress, crossings)
     assert len(laps) == most
     assert min((seconds for seconds, _ in laps), default=0) == min((b - a for a, b in clean), default=0)
 
@@ -460,7 +460,7 @@ def test_named_lines_start_where_the_robots_start() -> None:
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "rule",
     [
         criterion("visits", places=[NEAR]),
         criterion("stays_inside", areas=[{"circle": [100, 800, 1]}]),
@@ -476,10 +476,10 @@ def test_named_lines_start_where_the_robots_start() -> None:
         criterion("encounters", below=40),
         criterion("displacement", turn=[90, 90]),
     ],
-    ids=lambda asked: asked.check,
+    ids=lambda rule: rule.check,
 )
-def test_a_run_without_a_tick_is_judged(asked: Any) -> None:
-    result = judged(asked, driven())
+def test_a_run_without_a_tick_is_judged(rule: Any) -> None:
+    result = judged(rule, driven())
     assert result.message
     assert len(compute_positions(driven())) == 1
 
@@ -503,10 +503,10 @@ def test_the_outside_of_an_area_and_a_distance_are_kept(keys: dict[str, Any], go
 def test_how_near_it_came_to_the_outside_is_told() -> None:
     inside = {"name": "the arena", "rectangle": [0, 700, 300, 900], "outside": True}
     result = judged(criterion("keeps_out", areas=[inside], clear_of=60), driven(straight(160)))
-    told = (
+    messages = (
         "keep 60 mm from the outside of the arena, but it came too near at (245, 800); its smallest distance was 40 mm"
     )
-    assert told in result.message
+    assert messages in result.message
     assert measured(result, "least clearance") == pytest.approx(40)
 
 

@@ -63,9 +63,9 @@ def test_series_that_go_with_each_other(of: str, to: str, goes: str) -> None:
     run = towards(straight(60, 2), straight(60, 4), straight(60, 6))
     darker = np.linspace(255 * 305, 0, len(run.ticks)).astype(np.int64)
     run = replace(run, ticks=replace(run.ticks, left_sums=np.column_stack([darker] * 3)))
-    asked = {"of": of, "to": to, "goes": goes}
-    assert passes(criterion("relation", **asked), run)
-    assert not passes(criterion("relation", **(asked | {"goes": {"with": "against", "against": "with"}[goes]})), run)
+    relation = {"of": of, "to": to, "goes": goes}
+    assert passes(criterion("relation", **relation), run)
+    assert not passes(criterion("relation", **(relation | {"goes": {"with": "against", "against": "with"}[goes]})), run)
 
 
 def test_the_share_of_pairs_is_told_and_counts() -> None:
@@ -87,8 +87,8 @@ def test_a_robot_that_slows_down_at_the_post_needs_no_check_in_python(
     example: str, good: bool, runner: TrialRunner
 ) -> None:
     post = find_assignment("ultrasonic-stop")
-    asked = criterion("relation", scenarios=["at-the-post"], **NEARER)
-    slower = replace(post, criteria=(asked,))
+    rule = criterion("relation", scenarios=["at-the-post"], **NEARER)
+    slower = replace(post, criteria=(rule,))
     graded = grade(
         read_submission(locate_examples(post.id) / example, required_parts=post.parts), slower, runner=runner
     )

@@ -104,38 +104,43 @@ def test_reported_figures(keys: dict[str, Any], printed: list[str], passes: bool
 
 
 def test_each_pose_has_its_own_figures() -> None:
-    asked = criterion("reports", expected=[[100], [50]])
+    rule = criterion("reports", expected=[[100], [50]])
     poses = (START, Pose(200, 800, 0))
     right = [recorded(printed=lines("100")), recorded(printed=lines("50"))]
-    assert judged(asked, *right, poses=poses).marks == 4
-    assert judged(asked, *reversed(right), poses=poses).marks == 0
+    assert judged(rule, *right, poses=poses).marks == 4
+    assert judged(rule, *reversed(right), poses=poses).marks == 0
 
 
 def test_what_say_prints_as_well_is_reported_once() -> None:
-    said = lines("3", "4")
-    assert judged(criterion("reports", expected=[[3, 4]]), recorded(printed=said, spoken=said)).marks == 4
-    assert judged(criterion("reports", expected=[[3, 4, 3]]), recorded(printed=said, spoken=said)).marks == 0
+    spoken_texts = lines("3", "4")
+    assert (
+        judged(criterion("reports", expected=[[3, 4]]), recorded(printed=spoken_texts, spoken=spoken_texts)).marks == 4
+    )
+    assert (
+        judged(criterion("reports", expected=[[3, 4, 3]]), recorded(printed=spoken_texts, spoken=spoken_texts)).marks
+        == 0
+    )
 
 
 def test_replies_are_looked_at_whether_they_arrived_or_not() -> None:
     talk = (Message(0, "robot", "IMG_DATA::{}", 0), Message(0, "responder", '{"rows": 7}', None, 0, "undelivered"))
-    asked = criterion("reports", source="reply", expected=[["rows", 7]])
-    assert judged(asked, recorded(messages=talk)).marks == 4
-    assert "did not answer anything" in judged(asked, recorded()).message
+    rule = criterion("reports", source="reply", expected=[["rows", 7]])
+    assert judged(rule, recorded(messages=talk)).marks == 4
+    assert "did not answer anything" in judged(rule, recorded()).message
 
 
 def test_label_of_the_floor_is_what_has_to_be_reported() -> None:
     start = Pose(600, 750, 90)
     label = build_floor("MNIST_Digits", seed=34).find_label(580, 780)
-    asked = criterion("reports", expected="label", only=True)
-    told = recorded(background="MNIST_Digits", sheet=34, start=start, printed=lines(f"Label: {label}"))
-    assert judged(asked, told, poses=(start,)).marks == 4
-    wrong = replace(told, printed=lines(f"Label: {(int(label or 0) + 1) % 10}"))
-    assert judged(asked, wrong, poses=(start,)).marks == 0
+    rule = criterion("reports", expected="label", only=True)
+    recording = recorded(background="MNIST_Digits", sheet=34, start=start, printed=lines(f"Label: {label}"))
+    assert judged(rule, recording, poses=(start,)).marks == 4
+    wrong = replace(recording, printed=lines(f"Label: {(int(label or 0) + 1) % 10}"))
+    assert judged(rule, wrong, poses=(start,)).marks == 0
 
 
 @pytest.mark.parametrize(
-    ("keys", "said", "marks"),
+    ("keys", "spoken_texts", "marks"),
     [
         ({}, ["1", "2", "3"], 4),
         ({}, ["one two", "three"], 4),
@@ -149,19 +154,19 @@ def test_label_of_the_floor_is_what_has_to_be_reported() -> None:
         ({}, [], 0),
     ],
 )
-def test_words_in_sequence(keys: dict[str, Any], said: list[str], marks: Decimal) -> None:
-    result = judged(criterion("sequence", words=["1", "2", "3"], **keys), recorded(spoken=lines(*said)))
+def test_words_in_sequence(keys: dict[str, Any], spoken_texts: list[str], marks: Decimal) -> None:
+    result = judged(criterion("sequence", words=["1", "2", "3"], **keys), recorded(spoken=lines(*spoken_texts)))
     assert result.marks == marks, result.message
 
 
 def test_a_word_may_be_any_of_a_list() -> None:
-    asked = criterion("sequence", words=[["T", "tee"], ["M", "em"]])
-    assert judged(asked, recorded(spoken=lines("Tee em"))).marks == 4
-    assert judged(asked, recorded(spoken=lines("TM"))).marks == 0
+    rule = criterion("sequence", words=[["T", "tee"], ["M", "em"]])
+    assert judged(rule, recorded(spoken=lines("Tee em"))).marks == 4
+    assert judged(rule, recorded(spoken=lines("TM"))).marks == 0
 
 
 @pytest.mark.parametrize(
-    ("words", "keys", "said", "passes"),
+    ("words", "keys", "spoken_text", "passes"),
     [
         # The first matching alternative may be the prefix of the intended one.
         ([["OK", "OK go"], "now"], {}, "OK go now", True),
@@ -174,8 +179,8 @@ def test_a_word_may_be_any_of_a_list() -> None:
         (["1", ["2 3", "2"]], {"more": True}, "1 2 3", True),
     ],
 )
-def test_every_alternative_is_tried(words: list[Any], keys: dict[str, Any], said: str, passes: bool) -> None:
-    result = judged(criterion("sequence", words=words, **keys), recorded(spoken=lines(said)))
+def test_every_alternative_is_tried(words: list[Any], keys: dict[str, Any], spoken_text: str, passes: bool) -> None:
+    result = judged(criterion("sequence", words=words, **keys), recorded(spoken=lines(spoken_text)))
     assert result.evidence[0].passed is passes, result.message
 
 
@@ -189,24 +194,24 @@ short = st.lists(st.sampled_from("ab"), min_size=1, max_size=2).map(" ".join)
     st.booleans(),
 )
 def test_a_sequence_is_found_wherever_an_exhaustive_search_finds_it(
-    wanted: list[list[str]], said: list[str], lead_in: bool, more: bool
+    wanted: list[list[str]], spoken_texts: list[str], lead_in: bool, more: bool
 ) -> None:
-    asked = criterion("sequence", words=wanted, lead_in=lead_in, more=more, strays=100)
-    starts = range(len(said)) if lead_in else range(1)
-    begins = [said[start:] for start in starts]
+    rule = criterion("sequence", words=wanted, lead_in=lead_in, more=more, strays=100)
+    starts = range(len(spoken_texts)) if lead_in else range(1)
+    begins = [spoken_texts[start:] for start in starts]
 
     def fits(chosen: Sequence[str]) -> bool:
         words = " ".join(chosen).split()
         return any(begin[: len(words)] == words and (more or begin == words) for begin in begins)
 
-    result = judged(asked, recorded(spoken=lines(" ".join(said))))
+    result = judged(rule, recorded(spoken=lines(" ".join(spoken_texts))))
     assert result.evidence[0].passed is any(fits(chosen) for chosen in itertools.product(*wanted)), result.message
 
 
 def test_nothing_is_said_before_the_word_before_has_been_spoken() -> None:
-    asked = criterion("sequence", words=["1", "2"], waits=True)
-    assert judged(asked, recorded(spoken=lines("1", "2", every=0.47))).marks == 4
-    hurried = judged(asked, recorded(spoken=lines("1", "2", every=0.44)))
+    rule = criterion("sequence", words=["1", "2"], waits=True)
+    assert judged(rule, recorded(spoken=lines("1", "2", every=0.47))).marks == 4
+    hurried = judged(rule, recorded(spoken=lines("1", "2", every=0.44)))
     assert hurried.marks == 0
     assert "while it was still speaking" in hurried.message
 
@@ -220,14 +225,14 @@ BANDS = [{"text": "1", "zone": [120, 700, 140, 900]}, {"text": ["2", "two"], "zo
     [((0.1, 1.2), 4), ((0.1, 0.9), 2), ((1.2, 0.1), 0), ((0.1, 2.0), 2), ((0.1,), 2)],
 )
 def test_each_event_happens_at_its_place(times: tuple[float, ...], marks: int) -> None:
-    said = tuple(TimedText(t, text) for t, text in zip(times, ("band 1", "band two"), strict=False))
-    result = judged(criterion("events", events=BANDS, over="mean"), recorded(spoken=said))
+    speech = tuple(TimedText(t, text) for t, text in zip(times, ("band 1", "band two"), strict=False))
+    result = judged(criterion("events", events=BANDS, over="mean"), recorded(spoken=speech))
     assert result.marks == marks, result.message
 
 
 def test_margin_widens_every_zone() -> None:
-    said = (TimedText(0.1, "1"), TimedText(2.0, "2"))
-    assert judged(criterion("events", events=BANDS, margin=15), recorded(spoken=said)).marks == 4
+    speech = (TimedText(0.1, "1"), TimedText(2.0, "2"))
+    assert judged(criterion("events", events=BANDS, margin=15), recorded(spoken=speech)).marks == 4
 
 
 @pytest.mark.parametrize(
@@ -322,13 +327,13 @@ def test_series_of_the_datalog(keys: dict[str, Any], values: list[float], marks:
 )
 def test_only_what_was_read_counts_as_measured(instrument: str, value: float, genuine: bool) -> None:
     """The left sensor is over (51, 102, 153): 20, 40 and 60 percent."""
-    asked = criterion("datalog", series="Light_left", measured=instrument, at_least=2)
+    rule = criterion("datalog", series="Light_left", measured=instrument, at_least=2)
     recording = recorded(rgb=(51, 102, 153), datalog=series(value, value))
-    result = judged(asked, recording)
+    result = judged(rule, recording)
     assert result.marks == (4 if genuine else 0), result.message
     assert genuine or "all 2 samples are made up" in result.message
     motionless = replace(recording, ticks=recorded(seconds=0).ticks)
-    assert judged(asked, motionless).marks == 0
+    assert judged(rule, motionless).marks == 0
 
 
 def test_a_reading_must_be_fresh_when_it_is_printed() -> None:
@@ -363,19 +368,19 @@ def image(pose: Pose, side: str = "left", tick: int = 1, noise: int = 0) -> tupl
 
 def test_image_log_shows_what_lies_at_the_start() -> None:
     pose = Pose(600, 750, 90)
-    asked = criterion("image_log", left=1, right=1, pairs=True, at_start=True, uniform="right")
+    rule = criterion("image_log", left=1, right=1, pairs=True, at_start=True, uniform="right")
 
     def run(*log: tuple[str, str, int]) -> Recording:
         return recorded(background="MNIST_Digits", sheet=34, start=pose, end=pose, image_log=log)
 
     pair = (image(pose), image(pose, "right"))
-    assert judged(asked, run(*pair), poses=(pose,)).marks == 4
-    assert judged(asked, run(*reversed(pair)), poses=(pose,)).marks == 0
-    assert judged(asked, run(pair[0]), poses=(pose,)).marks == 0
+    assert judged(rule, run(*pair), poses=(pose,)).marks == 4
+    assert judged(rule, run(*reversed(pair)), poses=(pose,)).marks == 0
+    assert judged(rule, run(pair[0]), poses=(pose,)).marks == 0
     moved = Pose(603, 750, 90)
-    elsewhere = judged(asked, run(image(moved), image(moved, "right")), poses=(pose,))
+    elsewhere = judged(rule, run(image(moved), image(moved, "right")), poses=(pose,))
     assert "taken at the start pose" in elsewhere.message
-    assert judged(asked, run(*pair, *pair), poses=(pose,)).marks == 0
+    assert judged(rule, run(*pair, *pair), poses=(pose,)).marks == 0
 
 
 @pytest.mark.parametrize(

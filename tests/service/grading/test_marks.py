@@ -27,26 +27,28 @@ overs: st.SearchStrategy[Over] = st.sampled_from(("share", "all", "mean", "media
 
 @given(marks, outcomes, overs)
 def test_marks_are_within_bounds_and_full_exactly_for_a_full_share(
-    full: Decimal, found: list[Outcome], over: Over
+    full: Decimal, trial_outcomes: list[Outcome], over: Over
 ) -> None:
-    share = combine_outcomes(found, over)
+    share = combine_outcomes(trial_outcomes, over)
     got = compute_marks(full, share)
     assert 0 <= got <= full
     assert got == got.quantize(Decimal("0.01"))
-    if all(outcome.passed for outcome in found):
+    if all(outcome.passed for outcome in trial_outcomes):
         assert got == full
-    if over in ("all", "worst", "share", "mean") and not all(outcome.passed for outcome in found):
+    if over in ("all", "worst", "share", "mean") and not all(outcome.passed for outcome in trial_outcomes):
         assert share < 1
 
 
 @given(marks, outcomes, overs, st.data())
 def test_passing_one_more_trial_never_costs_marks(
-    full: Decimal, found: list[Outcome], over: Over, data: st.DataObject
+    full: Decimal, trial_outcomes: list[Outcome], over: Over, data: st.DataObject
 ) -> None:
-    place = data.draw(st.integers(0, len(found) - 1))
-    better = [*found]
+    place = data.draw(st.integers(0, len(trial_outcomes) - 1))
+    better = [*trial_outcomes]
     better[place] = Outcome(True, Fraction(1), "")
-    assert compute_marks(full, combine_outcomes(better, over)) >= compute_marks(full, combine_outcomes(found, over))
+    assert compute_marks(full, combine_outcomes(better, over)) >= compute_marks(
+        full, combine_outcomes(trial_outcomes, over)
+    )
 
 
 @given(marks, st.integers(0, 60), st.integers(1, 60), st.none() | st.floats(0.01, 1), st.sampled_from(("share", "all")))
@@ -92,6 +94,6 @@ def test_a_run_of_very_many_messages_is_judged_like_a_short_one() -> None:
     assert answered.marks == 4
 
 
-@pytest.mark.parametrize(("found", "expected"), [(10**400, 0.5), (-(10**400), 1.0), (float("inf"), 10**400)])
-def test_numbers_beyond_all_fractions_are_compared(found: float, expected: float) -> None:
-    assert not is_same_value(found, expected)
+@pytest.mark.parametrize(("actual", "expected"), [(10**400, 0.5), (-(10**400), 1.0), (float("inf"), 10**400)])
+def test_numbers_beyond_all_fractions_are_compared(actual: float, expected: float) -> None:
+    assert not is_same_value(actual, expected)

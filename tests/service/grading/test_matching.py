@@ -34,9 +34,9 @@ def test_as_many_pairs_as_an_exhaustive_search_finds(table: list[list[bool]]) ->
         taken = [place for place in chosen if place is not None]
         return suited(table, chosen) and len(set(taken)) == len(taken)
 
-    found = match_maximum_pairs(table)
-    assert is_pairing(found)
-    assert met(found) == max(met(way) for way in ways(len(table), len(table[0])) if is_pairing(way))
+    matches = match_maximum_pairs(table)
+    assert is_pairing(matches)
+    assert met(matches) == max(met(way) for way in ways(len(table), len(table[0])) if is_pairing(way))
 
 
 @given(tables, st.sampled_from((0, 1)))
@@ -48,9 +48,9 @@ def test_as_many_in_order_as_an_exhaustive_search_finds(table: list[list[bool]],
     def first_from(wish: int, start: int) -> int | None:
         return next((place for place in range(start, len(table[wish])) if table[wish][place]), None)
 
-    found = match_maximum_in_order(len(table), first_from, step)
-    assert is_in_order(found)
-    assert met(found) == max(met(way) for way in ways(len(table), len(table[0])) if is_in_order(way))
+    matches = match_maximum_in_order(len(table), first_from, step)
+    assert is_in_order(matches)
+    assert met(matches) == max(met(way) for way in ways(len(table), len(table[0])) if is_in_order(way))
 
 
 def test_what_comes_first_is_paired_first() -> None:

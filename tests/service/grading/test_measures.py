@@ -41,11 +41,11 @@ def runs() -> list[Recording]:
 )
 def test_what_is_measured_is_listed(table: dict[str, object]) -> None:
     keys = {"id": "c"} | table
-    asked = SCHEMAS[str(table["check"])].model_validate_json(json.dumps(keys))
-    measured = {measure.name for run in runs() for each in judged(asked, run).evidence for measure in each.measures}
+    criterion = SCHEMAS[str(table["check"])].model_validate_json(json.dumps(keys))
+    measured = {measure.name for run in runs() for each in judged(criterion, run).evidence for measure in each.measures}
     # Measures of a wrong move occur in failed trials only, and are never ranked.
-    assert [name for name in measured if not (asked.can_measure(name) or name.startswith("this move "))] == []
-    assert bool(measured) or not asked.measures or table["check"] in ("reports", "events", "sequence")
+    assert [name for name in measured if not (criterion.can_measure(name) or name.startswith("this move "))] == []
+    assert bool(measured) or not criterion.measures or table["check"] in ("reports", "events", "sequence")
 
 
 @pytest.mark.parametrize(

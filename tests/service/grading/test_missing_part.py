@@ -38,24 +38,24 @@ def test_what_is_there_is_graded(
     own = tmp_path / "ada"
     own.mkdir()
     (own / part).write_bytes((locate_examples(assignment) / "reference" / part).read_bytes())
-    asked = find_assignment(assignment)
-    graded = grade(read_submission(own, required_parts=asked.parts), asked, runner=runner)
+    graded_assignment = find_assignment(assignment)
+    graded = grade(read_submission(own, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
     assert {result.id: result.marks for result in graded.criteria} == marks
     (lacking,) = {"robot.py", "responder.py"} - {part}
     assert graded.missing == lacking
     lost = [result.message for result in graded.criteria if not result.marks]
     assert set(lost) == {f"There is no {lacking}."}
-    for told in (render_plain_text(build_staff_view(graded)), render_report_page(build_student_view(graded), {})):
-        assert f"There is no {lacking}, so" in told
-        assert f"Submit {lacking} together with {part}" in told
+    for each in (render_plain_text(build_staff_view(graded)), render_report_page(build_student_view(graded), {})):
+        assert f"There is no {lacking}, so" in each
+        assert f"Submit {lacking} together with {part}" in each
     assert build_json_document(build_staff_view(graded))["missing"] == lacking
 
 
 def test_a_responder_is_asked_alike_whenever_it_is_graded(runner: TrialRunner, tmp_path: Path) -> None:
-    asked = find_assignment("echo-responder")
+    assignment = find_assignment("echo-responder")
     (tmp_path / "responder.py").write_text("def responder(msg):\n    raise ValueError(msg)\n")
-    submission = read_submission(tmp_path, required_parts=asked.parts)
-    first, second = (grade(submission, asked, runner=runner) for _ in range(2))
+    submission = read_submission(tmp_path, required_parts=assignment.parts)
+    first, second = (grade(submission, assignment, runner=runner) for _ in range(2))
     assert [trial.recording.sha256 for trial in first.trials] == [trial.recording.sha256 for trial in second.trials]
     assert "error in the responder; no robot.py" in render_plain_text(build_staff_view(first))
 

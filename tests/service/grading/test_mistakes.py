@@ -38,10 +38,10 @@ def _cases() -> Iterator[ParameterSet]:
 def test_the_first_screen_names_the_cause_and_the_fix(
     case: Mapping[str, Any], runner: TrialRunner, tmp_path: Path
 ) -> None:
-    told = first_screen(case, tmp_path, runner)
-    assert [words for words in case["first_screen"] if words not in told] == [], told
-    assert [words for words in case.get("never", ()) if words in told] == [], told
-    assert "shown below" not in told
+    screen_text = first_screen(case, tmp_path, runner)
+    assert [words for words in case["first_screen"] if words not in screen_text] == [], screen_text
+    assert [words for words in case.get("never", ()) if words in screen_text] == [], screen_text
+    assert "shown below" not in screen_text
 
 
 @pytest.fixture
@@ -52,10 +52,10 @@ def brick(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, Any]:
     from ev3dev2.motor import LargeMotor, MoveSteering, MoveTank
     from ev3dev2.sensor.lego import ColorSensor, GyroSensor, UltrasonicSensor
 
-    found = (LargeMotor, MoveSteering, MoveTank, ColorSensor, GyroSensor, UltrasonicSensor)
+    brick_classes = (LargeMotor, MoveSteering, MoveTank, ColorSensor, GyroSensor, UltrasonicSensor)
     for name in set(sys.modules) - before:
         monkeypatch.delitem(sys.modules, name)
-    return {each.__name__: each for each in found}
+    return {each.__name__: each for each in brick_classes}
 
 
 def test_the_properties_that_hints_know_are_the_bricks(brick: Mapping[str, Any]) -> None:
@@ -67,19 +67,19 @@ def test_calls_are_written_as_the_brick_defines_them(brick: Mapping[str, Any]) -
     owners = {"tank_drive": "MoveTank", "tank_turn": "MoveSteering"}
     for name, usage in USAGE.items():
         owner, _, method = name.partition(".")
-        asked = list(inspect.signature(getattr(brick[owners[owner]], method)).parameters.values())[1:]
-        needed = [each.name for each in asked if each.default is inspect.Parameter.empty]
+        parameters = list(inspect.signature(getattr(brick[owners[owner]], method)).parameters.values())[1:]
+        needed = [each.name for each in parameters if each.default is inspect.Parameter.empty]
         written = re.findall(r"[\w ]+(?=[,)])", usage.partition("(")[2])
         assert len(written) == len(needed)
     assert {"on", "off", "on_for_seconds"} <= ACTIONS
 
 
 def test_the_ports_that_hints_name_are_the_bricks(brick: Mapping[str, Any]) -> None:
-    told = {each.pattern: advice for each, advice in ADVICE}
+    advice_by_pattern = {each.pattern: advice for each, advice in ADVICE}
     for kind, sensor in (("color", "ColorSensor"), ("gyro", "GyroSensor"), ("ultrasonic", "UltrasonicSensor")):
-        named = re.findall(r"INPUT_(\d)", told[f"No {kind} sensor connected to"])
+        named = re.findall(r"INPUT_(\d)", advice_by_pattern[f"No {kind} sensor connected to"])
         assert [f"in{number}" for number in named] == list(brick[sensor]._ports)
-    for letter in re.findall(r"OUTPUT_(\w)", told["No motor connected to"]):
+    for letter in re.findall(r"OUTPUT_(\w)", advice_by_pattern["No motor connected to"]):
         assert brick["LargeMotor"](f"out{letter}").address == f"out{letter}"
 
 

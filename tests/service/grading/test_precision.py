@@ -28,7 +28,7 @@ def drove(**parts: Any) -> Recording:
     return driven(straight(90, per_tick=1), **parts)
 
 
-def told(*texts: str, every: float = 0.02) -> tuple[TimedText, ...]:
+def build_texts(*texts: str, every: float = 0.02) -> tuple[TimedText, ...]:
     return tuple(TimedText(number * every, text) for number, text in enumerate(texts))
 
 
@@ -58,32 +58,32 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     (
         "prints",
         {"in_order": ["3", "2", "1"], "compare": "contains", "starts_with": "Count"},
-        {"printed": told("Light 86.2", "Count 3", "Count 2", "Light 12", "Count 1", *["Light 100"] * 300)},
-        {"printed": told(*[f"Count {number % 10}" for number in range(40)])},
+        {"printed": build_texts("Light 86.2", "Count 3", "Count 2", "Light 12", "Count 1", *["Light 100"] * 300)},
+        {"printed": build_texts(*[f"Count {number % 10}" for number in range(40)])},
     ),
     (
         "prints",
         {"in_order": ["3", "2", "1"], "compare": "contains"},
-        {"printed": told("3 to go", "2 to go", "1 to go", *[f"Light {value}" for value in range(40, 60)])},
-        {"printed": told(*["1 2 3"] * 10)},
+        {"printed": build_texts("3 to go", "2 to go", "1 to go", *[f"Light {value}" for value in range(40, 60)])},
+        {"printed": build_texts(*["1 2 3"] * 10)},
     ),
     (
         "prints",
         {"starts_with": "I predict", "among": ["left", "right"], "contains": "right"},
-        {"printed": told("I predict: it turns right")},
-        {"printed": told("I predict: left or right")},
+        {"printed": build_texts("I predict: it turns right")},
+        {"printed": build_texts("I predict: left or right")},
     ),
     (
         "prints",
         {"equals": "The answer is 42"},
-        {"printed": told(*[f"Light: {value}" for value in range(100)], "The answer is 42")},
-        {"printed": told(*[f"The answer is {guess}" for guess in GUESSES])},
+        {"printed": build_texts(*[f"Light: {value}" for value in range(100)], "The answer is 42")},
+        {"printed": build_texts(*[f"The answer is {guess}" for guess in GUESSES])},
     ),
     (
         "says",
         {"equals": "all done"},
-        {"spoken": told("I begin", "there it is", "one more", "all done")},
-        {"spoken": told(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])},
+        {"spoken": build_texts("I begin", "there it is", "one more", "all done")},
+        {"spoken": build_texts(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])},
     ),
     (
         "messages",
@@ -106,15 +106,15 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     (
         "sequence",
         {"words": ["1", "2", "3"], "lead_in": True, "more": True},
-        {"spoken": told("In 1 minute I count", "1", "2", "3", "and that was it")},
-        {"spoken": told(*["1 3", "2 1", "3 2", "1 2 3"] * 5)},
+        {"spoken": build_texts("In 1 minute I count", "1", "2", "3", "and that was it")},
+        {"spoken": build_texts(*["1 3", "2 1", "3 2", "1 2 3"] * 5)},
     ),
     (
         "reports",
         {"expected": [[17]]},
         # A program may print readings and their count throughout the run.
-        {"printed": tuple(TimedText(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + told("17")},
-        {"printed": told(*GUESSES, every=0)},
+        {"printed": tuple(TimedText(0.5 + n / 100, f"{n}: 100 %, 255") for n in range(100, 190)) + build_texts("17")},
+        {"printed": build_texts(*GUESSES, every=0)},
     ),
     (
         "reports",
@@ -135,8 +135,8 @@ CASES: Sequence[tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
 def test_naming_everything_earns_less_than_a_third_and_honest_work_all(
     check: str, keys: dict[str, Any], honest: dict[str, Any], sprayed: dict[str, Any]
 ) -> None:
-    asked = criterion(check, over="mean", **keys)
-    fair, unfair = judged(asked, drove(**honest)), judged(asked, drove(**sprayed))
+    rule = criterion(check, over="mean", **keys)
+    fair, unfair = judged(rule, drove(**honest)), judged(rule, drove(**sprayed))
     assert fair.marks == fair.max_marks, fair.message
     assert 3 * unfair.marks < unfair.max_marks, unfair.message
 
@@ -162,31 +162,31 @@ def test_every_kind_that_looks_among_much_has_its_case() -> None:
 def test_strays_that_are_not_forgiven_count_like_more_that_did_not_come(
     forgiven: int | None, wanted: int, misplaced: int, others: int, score: str | int
 ) -> None:
-    asked = criterion("says", at_least=1, strays=forgiven)
-    assert isinstance(asked, CriterionWithStrays)
+    rule = criterion("says", at_least=1, strays=forgiven)
+    assert isinstance(rule, CriterionWithStrays)
     strays = Strays("more came", misplaced, others)
-    outcome = apply_stray_penalty(pass_with("All came."), asked, wanted, strays)
+    outcome = apply_stray_penalty(pass_with("All came."), rule, wanted, strays)
     assert (outcome.score, outcome.passed) == (Decimal(score), score == 1)
     assert ("more came" in outcome.message) == (score != 1)
-    half = apply_stray_penalty(fail_with("Half came.", score=outcome.score / 2), asked, wanted, strays)
+    half = apply_stray_penalty(fail_with("Half came.", score=outcome.score / 2), rule, wanted, strays)
     assert half.score == outcome.score**2 / 2
 
 
 def test_what_may_not_come_too_often_is_not_looked_for() -> None:
-    many = told(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])
-    asked = criterion("prints", contains="done", at_most=20)
-    assert judged(asked, drove(printed=many)).marks == 4
+    many = build_texts(*[f"{begin} {end}" for begin in BEGINNINGS for end in ENDS])
+    rule = criterion("prints", contains="done", at_most=20)
+    assert judged(rule, drove(printed=many)).marks == 4
 
 
 def test_a_loop_that_is_stuck_on_one_text_names_nothing_else() -> None:
-    asked = criterion("prints", in_order=["0", "1", "2"], compare="contains", over="mean", starts_with="Robot")
-    result = judged(asked, drove(printed=told("Robot 0", *["Robot 1"] * 50)))
+    rule = criterion("prints", in_order=["0", "1", "2"], compare="contains", over="mean", starts_with="Robot")
+    result = judged(rule, drove(printed=build_texts("Robot 0", *["Robot 1"] * 50)))
     assert result.marks == Decimal("2.67")
 
 
 def test_a_log_is_called_made_up_where_most_of_it_is() -> None:
     """140 samples, of which two are real readings of the sensor."""
-    asked = criterion("datalog", series="Light", measured="left light", at_least=40)
-    result = judged(asked, drove(datalog=logged(100, 100, *[17.0] * 138)))
+    rule = criterion("datalog", series="Light", measured="left light", at_least=40)
+    result = judged(rule, drove(datalog=logged(100, 100, *[17.0] * 138)))
     assert "at least 40 samples of Light, but there are 2; 138 of 140 are made up" in result.message
     assert "not readings of the left light sensor" in result.message

@@ -146,16 +146,16 @@ def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     text: str, trusting: Assignment, runner: TrialRunner
 ) -> None:
     result = grade(Submission("ada", SourceFile("robot.py", f"print({text!r})")), trusting, runner=runner)
-    asked, ended = result.criteria
-    assert asked.marks == 0
-    assert asked.unjudged
+    checked_result, ended = result.criteria
+    assert checked_result.marks == 0
+    assert checked_result.unjudged
     assert ended.marks == 2
     assert not ended.unjudged
-    told = render_plain_text(build_staff_view(result))
-    assert "For staff: Could not be judged: " in told
-    shown = render_plain_text(build_student_view(result))
-    assert "This criterion could not be judged. Staff will review it." in shown
-    assert asked.unjudged[:30] not in shown
+    plain_text = render_plain_text(build_staff_view(result))
+    assert "For staff: Could not be judged: " in plain_text
+    output = render_plain_text(build_student_view(result))
+    assert "This criterion could not be judged. Staff will review it." in output
+    assert checked_result.unjudged[:30] not in output
 
 
 def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
@@ -163,10 +163,10 @@ def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
 ) -> None:
     few = replace(trusting, limits=replace(trusting.limits, all_cpu=1.5))
     program = SourceFile("robot.py", "print('json [1]')\nwhile True: pass")
-    asked, ended = grade(Submission("ada", program), few, runner=runner).criteria
+    checked_result, ended = grade(Submission("ada", program), few, runner=runner).criteria
     assert ended.marks == 0
-    assert not asked.unjudged
-    assert asked.evidence[0].passed
+    assert not checked_result.unjudged
+    assert checked_result.evidence[0].passed
 
 
 @pytest.mark.parametrize(

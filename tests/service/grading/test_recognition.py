@@ -58,7 +58,7 @@ check = "{check}"
 """
 
 
-def asked(check: str = "classification", **keys: Any) -> Criterion:
+def build_criterion(check: str = "classification", **keys: Any) -> Criterion:
     return criterion(check, **keys)
 
 
@@ -119,7 +119,7 @@ def test_every_image_has_one_reply_status(
         Image(1.0, 30, Pose(300, 800, 0), b"", b"", last, None),
     )
     recording = recorded(images, (first, *replies, Message(1.0, "robot", "IMG_DATA::{}", 1.0)))
-    counts = accuracy(judged(asked(), recording)).counts
+    counts = accuracy(judged(build_criterion(), recording)).counts
     assert counts is not None
     expected = {"answered": 0, "late": 0, "malformed": 0, "unanswered": 1} | {"sent": 2, "duplicates": duplicates}
     expected[status] += 1
@@ -145,13 +145,13 @@ def test_of_several_answers_the_first_that_arrived_counts(
     replies = tuple(Message(0.0, "responder", text, t, 0, note) for text, t, note in answers)
     moved = replace(recording.images[1], message=len(replies) + 1)
     recording = replace(recording, messages=(sent, *replies, following), images=(recording.images[0], moved))
-    assert judged(asked(), recording).marks == marks
+    assert judged(build_criterion(), recording).marks == marks
 
 
 def test_an_answer_that_is_no_text_is_malformed() -> None:
     fault = Fault(0.0, Verdict.PROTOCOL_ERROR, "responder", "the responder returned dict instead of a text")
     recording = replace(talk(("square", None)), faults=(fault,))
-    result = judged(asked(), recording)
+    result = judged(build_criterion(), recording)
     counts = accuracy(result).counts
     assert counts is not None
     assert (counts.malformed, counts.unanswered) == (1, 0)
@@ -161,8 +161,8 @@ def test_an_answer_that_is_no_text_is_malformed() -> None:
 def test_a_late_answer_counts_unless_the_criterion_says_otherwise() -> None:
     late = talk(("square", "square"))
     late = replace(late, messages=(late.messages[0], replace(late.messages[1], delivered=None, note="undelivered")))
-    assert judged(asked(), late).marks == 4
-    refused = judged(asked(late="wrong"), late)
+    assert judged(build_criterion(), late).marks == 4
+    refused = judged(build_criterion(late="wrong"), late)
     assert refused.marks == 0
     assert 'the answer came too late: "square"' in refused.message
     assert "0 answered, 1 late, 0 malformed, 0 unanswered" in refused.message
@@ -204,16 +204,20 @@ def recordings(draw: st.DrawFn) -> Recording:
     ),
 )
 def test_the_counts_add_up(driven: list[Recording], keys: dict[str, Any]) -> None:
-    result = judged(asked(**keys), *driven)
-    found = accuracy(result)
-    counts = found.counts
+    result = judged(build_criterion(**keys), *driven)
+    measured_accuracy = accuracy(result)
+    counts = measured_accuracy.counts
     assert counts is not None
     assert counts.sent == sum(len(recording.images) for recording in driven)
     assert counts.sent == counts.answered + counts.late + counts.malformed + counts.unanswered
-    assert found.n == counts.counted + counts.missing == sum(number for _, _, number in found.confusion)
-    assert counts.missing == sum(number for truth, _, number in found.confusion if truth == NO_IMAGE)
-    assert sum(score.shown for score in compute_class_scores(found)) == found.n
-    assert 0 <= found.low <= found.value <= found.high <= 1
+    assert (
+        measured_accuracy.n
+        == counts.counted + counts.missing
+        == sum(number for _, _, number in measured_accuracy.confusion)
+    )
+    assert counts.missing == sum(number for truth, _, number in measured_accuracy.confusion if truth == NO_IMAGE)
+    assert sum(score.shown for score in compute_class_scores(measured_accuracy)) == measured_accuracy.n
+    assert 0 <= measured_accuracy.low <= measured_accuracy.value <= measured_accuracy.high <= 1
     numbers = [int(word) for word in build_recognition_table(result).sums.split() if word.isdecimal()]
     assert numbers[0] == sum(numbers[1:5])
 
@@ -225,18 +229,18 @@ def test_the_grey_patch_can_be_the_truth() -> None:
         return pixels.tobytes()
 
     greys = (0, 42, 85, 127, 170, 212)
-    shown = [Image(0, 0, START, b"", patch(grey), 0) for grey in greys]
-    assert [decode_label(image, CODES["shapes"]) for image in shown] == list(SHAPES)
+    images = [Image(0, 0, START, b"", patch(grey), 0) for grey in greys]
+    assert [decode_label(image, CODES["shapes"]) for image in images] == list(SHAPES)
     for useless in (patch(60), patch(85, edge=5), patch(255)):
-        assert decode_label(replace(shown[0], right=useless), CODES["shapes"]) is None
+        assert decode_label(replace(images[0], right=useless), CODES["shapes"]) is None
     chance = np.random.default_rng(1)
     noisy = np.frombuffer(patch(127), np.uint8).astype(int) + chance.integers(-32, 33, 1600)
-    image = replace(shown[0], right=noisy.clip(0, 255).astype(np.uint8).tobytes())
+    image = replace(images[0], right=noisy.clip(0, 255).astype(np.uint8).tobytes())
     assert decode_label(image, CODES["shapes"], light_noise=32) == "downwards facing triangle"
     assert decode_label(image, CODES["shapes"]) is None
     recording = talk((None, "left facing triangle"), (None, "square"))
     seen = tuple(replace(image, right=patch(85)) for image in recording.images)
-    assert judged(asked(truth="grey"), replace(recording, images=seen)).marks == 2
+    assert judged(build_criterion(truth="grey"), replace(recording, images=seen)).marks == 2
 
 
 GREY_WORLD = """
@@ -294,17 +298,17 @@ def test_the_grey_patch_can_be_the_truth_on_an_image_of_the_instructors_own(
 )
 def test_greys_that_cannot_be_used_are_refused(keys: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValidationError, match=sentence):
-        asked(**keys)
+        build_criterion(**keys)
 
 
 def test_the_instructors_places_can_be_the_truth() -> None:
     # The left sensor of a robot at (100, 800) that faces 0 degrees is at (130, 820).
     places = [[130, 820, "church"], [160, 828, "mill"], [400, 400, "inn"]]
     recording = talk((None, "a church"), (None, "the mill"), (None, "church"))
-    assert judged(asked(truth="places", places=places), recording).message.startswith(
+    assert judged(build_criterion(truth="places", places=places), recording).message.startswith(
         "2 of 2 images identified correctly"
     )
-    near = judged(asked(truth="places", places=places, within=5), recording)
+    near = judged(build_criterion(truth="places", places=places, within=5), recording)
     assert near.message.startswith("1 of 1 images")
 
 
@@ -354,18 +358,20 @@ def test_mistakes_are_named_with_their_line(
     tmp_path: Path, labels: str, sweep: str, check: str, keys: str, sentence: str
 ) -> None:
     (tmp_path / "assignment.toml").write_text(HEAD.format(labels=labels, sweep=sweep, check=check) + keys)
-    with pytest.raises(AssignmentProblems) as found:
+    with pytest.raises(AssignmentProblems) as raised:
         read_assignment(tmp_path)
-    assert sentence in str(found.value)
+    assert sentence in str(raised.value)
 
 
 def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
     document = (ROOT / "docs" / "recognition.md").read_text()
-    shown, training = re.findall(r"```toml\n(.*?)```", document, re.DOTALL)
-    (tmp_path / "assignment.toml").write_text(shown)
-    found = read_assignment(tmp_path)
-    assert len(list(found.trials())) == 70
-    (tmp_path / "assignment.toml").write_text(f"{shown}\n{training}".replace('"collected"', '"worse-and-worse"'))
+    robustness_example, training = re.findall(r"```toml\n(.*?)```", document, re.DOTALL)
+    (tmp_path / "assignment.toml").write_text(robustness_example)
+    assignment = read_assignment(tmp_path)
+    assert len(list(assignment.trials())) == 70
+    (tmp_path / "assignment.toml").write_text(
+        f"{robustness_example}\n{training}".replace('"collected"', '"worse-and-worse"')
+    )
     (tmp_path / "drive_over_shapes.py").write_text("")
     with pytest.raises(
         AssignmentProblems,
@@ -375,27 +381,27 @@ def test_the_assignment_in_the_document_is_in_order(tmp_path: Path) -> None:
 
 
 def test_confidence_is_averaged_apart_for_right_and_wrong() -> None:
-    said = 'JSON::{{"shape": "{}", "confidence": {}}}'.format
+    format_answer = 'JSON::{{"shape": "{}", "confidence": {}}}'.format
     recording = talk(
-        ("square", said("square", 0.9)),
-        ("square", said("square", 0.7)),
-        ("diamond", said("square", 0.4)),
-        ("diamond", said("diamond", 7)),
-        ("diamond", said("diamond", "true")),
+        ("square", format_answer("square", 0.9)),
+        ("square", format_answer("square", 0.7)),
+        ("diamond", format_answer("square", 0.4)),
+        ("diamond", format_answer("diamond", 7)),
+        ("diamond", format_answer("diamond", "true")),
     )
-    result = judged(asked(answer="shape", confidence="confidence"), recording)
-    told = accuracy(result).confidence
-    assert told is not None
-    assert (told.right, told.n_right) == (pytest.approx(0.8), 2)
-    assert (told.wrong, told.n_wrong) == (pytest.approx(0.4), 1)
+    result = judged(build_criterion(answer="shape", confidence="confidence"), recording)
+    confidence = accuracy(result).confidence
+    assert confidence is not None
+    assert (confidence.right, confidence.n_right) == (pytest.approx(0.8), 2)
+    assert (confidence.wrong, confidence.n_wrong) == (pytest.approx(0.4), 1)
     assert "Mean confidence 0.80 when right (2) and 0.40 when wrong (1)." in result.message
-    assert accuracy(judged(asked(answer="shape"), recording)).confidence is None
+    assert accuracy(judged(build_criterion(answer="shape"), recording)).confidence is None
 
 
 @pytest.mark.parametrize(("right", "marks"), [(0, "0"), (4, "0"), (5, "2"), (8, "2"), (9, "4"), (10, "4")])
 def test_marks_by_steps(right: int, marks: str) -> None:
     answers = [("square", "square" if number < right else "diamond") for number in range(10)]
-    result = judged(asked(steps=[[0.5, 2], [0.9, 4]]), talk(*answers))
+    result = judged(build_criterion(steps=[[0.5, 2], [0.9, 4]]), talk(*answers))
     assert result.marks == Decimal(marks)
     assert ("Marks: 2 from 0.5, 4 from 0.9." in result.message) is (result.marks < 4)
 
@@ -415,7 +421,7 @@ def test_marks_by_steps(right: int, marks: str) -> None:
 def test_images_of_one_pattern_are_one_answer(how: str, answers: list[str | None], named: bool) -> None:
     recording = talk(*[("square", answer) for answer in answers])
     close = tuple(replace(image, pose=Pose(100 + n, 800, 0)) for n, image in enumerate(recording.images))
-    result = judged(asked(each_pattern=how), replace(recording, images=close))
+    result = judged(build_criterion(each_pattern=how), replace(recording, images=close))
     assert (accuracy(result).n, result.marks) == (1, 4 if named else 0), result.message
     assert len(result.predictions) == len(answers)
     assert "patterns identified correctly" in result.message
@@ -424,8 +430,8 @@ def test_images_of_one_pattern_are_one_answer(how: str, answers: list[str | None
 def test_patterns_are_told_apart_by_place_and_missing_ones_are_wrong() -> None:
     # 30 mm apart: the images before the gap show one square, those after it another.
     recording = talk(("square", "square"), ("square", "square"), (None, "square"), ("square", "square"))
-    assert accuracy(judged(asked(each_pattern="first"), recording)).n == 2
-    result = judged(asked(each_pattern="first", patterns=4), recording)
+    assert accuracy(judged(build_criterion(each_pattern="first"), recording)).n == 2
+    result = judged(build_criterion(each_pattern="first", patterns=4), recording)
     assert (accuracy(result).n, result.marks) == (4, 2)
     assert "images of 2 patterns, and 4 were expected" in result.message
 
@@ -434,12 +440,12 @@ def test_images_taken_elsewhere_do_not_count_near_the_start() -> None:
     """A robot may not drive on to an image that is easier to recognise."""
     moved = talk(("square", None), ("diamond", None), ("circle", "circle"))
     stayed = talk(("square", None), ("circle", "circle"))
-    assert judged(asked(images="last"), moved).marks == 4
+    assert judged(build_criterion(images="last"), moved).marks == 4
     for recording in (moved, stayed):
-        result = judged(asked(images="last", near_start=20), recording)
+        result = judged(build_criterion(images="last", near_start=20), recording)
         assert result.marks == 0
         assert 'The image showed "square"' in result.message
-    left = judged(asked(near_start=20), replace(moved, images=moved.images[1:]))
+    left = judged(build_criterion(near_start=20), replace(moved, images=moved.images[1:]))
     assert (left.marks, accuracy(left).n) == (0, 1)
     assert "the robot sent none from within 20 mm of where it started" in left.message
 
@@ -449,13 +455,15 @@ def test_more_images_near_the_start_do_not_weigh_more() -> None:
     sure = talk(*[("square", "square")] * 9)
     walked = tuple(replace(image, pose=Pose(100 + 1.5 * n, 800, 0)) for n, image in enumerate(sure.images))
     unsure = talk(("diamond", "square"))
-    result = judged(asked(near_start=30), replace(sure, images=walked), unsure)
+    result = judged(build_criterion(near_start=30), replace(sure, images=walked), unsure)
     assert (accuracy(result).n, result.marks) == (2, 2), result.message
 
 
 def test_precision_and_recall_of_each_class() -> None:
-    said = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
-    scores = {score.label: score for score in compute_class_scores(accuracy(judged(asked(), talk(*said))))}
+    label_pairs = [("square", "square"), ("square", "diamond"), ("diamond", "diamond"), ("diamond", None)]
+    scores = {
+        score.label: score for score in compute_class_scores(accuracy(judged(build_criterion(), talk(*label_pairs))))
+    }
     assert (scores["square"].precision, scores["square"].recall) == (1.0, 0.5)
     assert (scores["diamond"].precision, scores["diamond"].recall) == (0.5, 0.5)
     assert (scores["upwards facing triangle"].precision, scores["upwards facing triangle"].recall) == (None, None)
@@ -463,7 +471,7 @@ def test_precision_and_recall_of_each_class() -> None:
 
 def test_the_levels_of_a_hidden_sweep_are_not_told() -> None:
     scenario = Scenario("s", (START,), sweep=Sweep(light_noise=(0, 64)))
-    criterion = asked("robustness", along="light_noise")
+    criterion = build_criterion("robustness", along="light_noise")
     assignment = Assignment("a", "A", WorldSpec("Simple_Shapes"), Parts(), (scenario,), (criterion,))
     for visibility in ("visible", "hidden"):
         trials = tuple(
@@ -491,5 +499,5 @@ def test_images_taken_far_from_what_they_show_do_not_count() -> None:
     x, y = locate_part(recording, "left", first.pose)
     recording = replace(recording, images=(first, replace(second, pose=replace(first.pose, x=first.pose.x + 8))))
     keys: dict[str, Any] = {"truth": "places", "places": [[x, y, "square"]]}
-    assert judged(asked(**keys), recording).marks < 4
-    assert judged(asked(near_spot=5, **keys), recording).marks == 4
+    assert judged(build_criterion(**keys), recording).marks < 4
+    assert judged(build_criterion(near_spot=5, **keys), recording).marks == 4

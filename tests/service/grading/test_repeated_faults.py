@@ -100,19 +100,19 @@ def test_a_spared_trial_is_what_running_it_gives(
     tmp_path: Path, runner: TrialRunner, runs_all: TrialRunner, files: Mapping[str, str], role: str, count: int
 ) -> None:
     (tmp_path / "assignment.toml").write_text(TOML)
-    asked = read_assignment(tmp_path)
+    assignment = read_assignment(tmp_path)
     (tmp_path / "ada").mkdir()
     for name, text in {"responder.py": ECHO, **files}.items():
         (tmp_path / "ada" / name).write_text(text)
-    submission = read_submission(tmp_path / "ada", required_parts=asked.parts)
-    found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
-    assert (len(spared(found, role)), len(spared(wanted, role))) == (count, 0)
-    for one, other in zip(found.trials, wanted.trials, strict=True):
+    submission = read_submission(tmp_path / "ada", required_parts=assignment.parts)
+    skipping_grade, wanted = (grade(submission, assignment, runner=each) for each in (runner, runs_all))
+    assert (len(spared(skipping_grade, role)), len(spared(wanted, role))) == (count, 0)
+    for one, other in zip(skipping_grade.trials, wanted.trials, strict=True):
         assert one.recording.sha256 == other.recording.sha256
         assert all_but_ticks(one.recording) == all_but_ticks(other.recording)
-    assert [each.marks for each in found.criteria] == [each.marks for each in wanted.criteria]
-    told = [note for note in found.notes if "the result would be the same" in note]
-    assert [f"in {count} of 4 trials" in note for note in told] == ([True] if count else [])
+    assert [each.marks for each in skipping_grade.criteria] == [each.marks for each in wanted.criteria]
+    skip_notes = [note for note in skipping_grade.notes if "the result would be the same" in note]
+    assert [f"in {count} of 4 trials" in note for note in skip_notes] == ([True] if count else [])
 
 
 def _turns_of(seconds: float) -> int:
@@ -136,13 +136,16 @@ def _turns_of(seconds: float) -> int:
 )
 def test_near_its_limit_every_trial_is_run(program: str, tmp_path: Path, runner: TrialRunner) -> None:
     (tmp_path / "assignment.toml").write_text(TOML)
-    asked = read_assignment(tmp_path)
+    assignment = read_assignment(tmp_path)
     (tmp_path / "ada").mkdir()
     text = program.replace("FEWER_TURNS", str(_turns_of(0.16))).replace("TURNS", str(_turns_of(0.24)))
     (tmp_path / "ada" / "robot.py").write_text(text)
     (tmp_path / "ada" / "responder.py").write_text(ECHO)
     assert (
-        spared(grade(read_submission(tmp_path / "ada", required_parts=asked.parts), asked, runner=runner), "robot")
+        spared(
+            grade(read_submission(tmp_path / "ada", required_parts=assignment.parts), assignment, runner=runner),
+            "robot",
+        )
         == []
     )
 
@@ -150,11 +153,11 @@ def test_near_its_limit_every_trial_is_run(program: str, tmp_path: Path, runner:
 def test_how_many_hidden_trials_were_spared_is_not_told(tmp_path: Path, runner: TrialRunner) -> None:
     hidden = 'seconds = 5\n[[scenario]]\nid = "two"\nvisibility = "hidden"\nposes = [[300, 700, 0], [400, 700, 0]]\n'
     (tmp_path / "assignment.toml").write_text(TOML.replace("seconds = 5\n", hidden + "seconds = 5\n"))
-    asked = read_assignment(tmp_path)
+    assignment = read_assignment(tmp_path)
     (tmp_path / "ada").mkdir()
     (tmp_path / "ada" / "robot.py").write_text("print(wheel)")
     (tmp_path / "ada" / "responder.py").write_text(ECHO)
-    graded = grade(read_submission(tmp_path / "ada", required_parts=asked.parts), asked, runner=runner)
+    graded = grade(read_submission(tmp_path / "ada", required_parts=assignment.parts), assignment, runner=runner)
     assert len(spared(graded, "robot")) == len(graded.trials) - 2
     visible = [each for each in graded.trials if each.visibility == "visible"]
     assert any(f"in {len(visible) - 2} of {len(visible)} trials" in note for note in graded.notes)
@@ -176,10 +179,12 @@ def _faulty() -> list[tuple[str, str]]:
 def test_faulty_examples_get_the_same_with_every_trial_run(
     runner: TrialRunner, runs_all: TrialRunner, name: str, example: str
 ) -> None:
-    asked = find_assignment(name)
+    assignment = find_assignment(name)
     submission = read_example(name, example)
-    found, wanted = (grade(submission, asked, runner=each) for each in (runner, runs_all))
-    assert [(each.id, each.marks) for each in found.criteria] == [(each.id, each.marks) for each in wanted.criteria]
-    assert [each.verdict for each in found.trials] == [each.verdict for each in wanted.trials]
-    pairs = zip(found.trials, wanted.trials, strict=True)
+    skipping_grade, wanted = (grade(submission, assignment, runner=each) for each in (runner, runs_all))
+    assert [(each.id, each.marks) for each in skipping_grade.criteria] == [
+        (each.id, each.marks) for each in wanted.criteria
+    ]
+    assert [each.verdict for each in skipping_grade.trials] == [each.verdict for each in wanted.trials]
+    pairs = zip(skipping_grade.trials, wanted.trials, strict=True)
     assert all(one.recording.sha256 == other.recording.sha256 for one, other in pairs)

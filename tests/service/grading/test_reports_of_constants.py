@@ -31,7 +31,7 @@ _SHARED_ROWS = _ROWS.flatmap(
 )
 
 
-def _said(text: str) -> Recording:
+def _record_speech(text: str) -> Recording:
     return recorded(printed=(TimedText(1.0, text),))
 
 
@@ -41,17 +41,17 @@ def _places(count: int) -> tuple[Pose, ...]:
 
 def _passes(rows: list[list[Any]], text: str) -> int:
     """Return the number of poses at which the constant text passes."""
-    asked = criterion("reports", expected=rows, tolerance=0.4, strays=1000)
-    result = judged(asked, *[_said(text)] * len(rows), poses=_places(len(rows)))
+    rule = criterion("reports", expected=rows, tolerance=0.4, strays=1000)
+    result = judged(rule, *[_record_speech(text)] * len(rows), poses=_places(len(rows)))
     return sum(evidence.passed for evidence in result.evidence)
 
 
 def _scores(rows: list[list[Any]], text: str, over: str) -> tuple[Decimal, list[Decimal]]:
     """Return the marks of the constant text, out of 4, and those at each pose alone."""
-    asked = criterion("reports", expected=rows, tolerance=0.4, strays=1000, over=over)
+    rule = criterion("reports", expected=rows, tolerance=0.4, strays=1000, over=over)
     poses = _places(len(rows))
-    runs = [_said(text)] * len(rows)
-    assignment = Assignment("a", "A", WorldSpec(), Parts(), (Scenario("s", poses),), (asked,))
+    runs = [_record_speech(text)] * len(rows)
+    assignment = Assignment("a", "A", WorldSpec(), Parts(), (Scenario("s", poses),), (rule,))
     trials = tuple(TrialResult("s", n, 1, 0.0, 0.0, "visible", run, place=n) for n, run in enumerate(runs))
     alone = [judge(assignment, (trial,))[0].marks for trial in trials]
     return judge(assignment, trials)[0].marks, alone
@@ -66,8 +66,8 @@ def _most(rows: list[list[Any]]) -> int:
 def test_no_constant_text_passes_at_more_than_half_of_the_poses(rows: list[list[Any]], data: st.DataObject) -> None:
     entries = [entry for row in rows for entry in row]
     parts = st.sampled_from(["or", "and", *entries]) | st.sampled_from(rows).map(lambda row: " ".join(map(str, row)))
-    said = data.draw(st.lists(parts, min_size=1, max_size=12))
-    assert _passes(rows, " ".join(map(str, said))) <= _most(rows)
+    constant_parts = data.draw(st.lists(parts, min_size=1, max_size=12))
+    assert _passes(rows, " ".join(map(str, constant_parts))) <= _most(rows)
 
 
 @given(_ROWS | _SHARED_ROWS, st.sampled_from(["mean", "median", "worst"]), st.data())
@@ -75,8 +75,8 @@ def test_no_constant_text_earns_anything_at_more_than_half_of_the_poses(
     rows: list[list[Any]], over: str, data: st.DataObject
 ) -> None:
     beginnings = [row[:count] for row in rows for count in range(1, len(row) + 1)]
-    said = data.draw(st.lists(st.sampled_from(beginnings), min_size=1, max_size=8))
-    total, alone = _scores(rows, " ".join(str(entry) for each in said for entry in each), over)
+    constant_parts = data.draw(st.lists(st.sampled_from(beginnings), min_size=1, max_size=8))
+    total, alone = _scores(rows, " ".join(str(entry) for each in constant_parts for entry in each), over)
     paid = sum(marks > 0 for marks in alone)
     assert paid <= _most(rows)
     if 2 * paid <= len(rows):
@@ -132,10 +132,10 @@ def _labelled(background: str) -> dict[str, Pose]:
 
 def _passes_at_labels(background: str, text: str, **keys: Any) -> list[str]:
     """Return the labels at which the constant text passes."""
-    asked = criterion("reports", expected="label", strays=1000, **keys)
+    rule = criterion("reports", expected="label", strays=1000, **keys)
     places = _labelled(background)
     runs = [recorded(background=background, start=pose, printed=(TimedText(1.0, text),)) for pose in places.values()]
-    result = judged(asked, *runs, poses=tuple(places.values()))
+    result = judged(rule, *runs, poses=tuple(places.values()))
     return [label for label, evidence in zip(places, result.evidence, strict=True) if evidence.passed]
 
 
@@ -155,8 +155,10 @@ def test_a_list_of_labels_passes_at_one_of_them_at_most(
 ) -> None:
     labels = st.sampled_from([*list_label_names(background), "nothing"])
     numbers = st.integers(-1, 20).map(lambda half: str(half / 2))
-    said = data.draw(st.lists(labels | numbers if background == "MNIST_Digits" else labels, min_size=1, max_size=12))
-    assert len(_passes_at_labels(background, ", ".join(said), **keys)) <= 1
+    reported_labels = data.draw(
+        st.lists(labels | numbers if background == "MNIST_Digits" else labels, min_size=1, max_size=12)
+    )
+    assert len(_passes_at_labels(background, ", ".join(reported_labels), **keys)) <= 1
 
 
 @pytest.mark.parametrize("background", ["Simple_Shapes", "MNIST_Digits"])
@@ -180,9 +182,9 @@ _SQUARE, _NOWHERE = _labelled("Simple_Shapes")["square"], Pose(5, 5, 0)
     ],
 )
 def test_a_label_that_fits_most_poses_is_warned_of(world: WorldSpec, poses: list[Pose], warned: str) -> None:
-    asked = criterion("reports", expected="label")
+    rule = criterion("reports", expected="label")
     warnings = list(
-        find_guessable_reports(Assignment("a", "A", world, Parts(), (Scenario("s", tuple(poses)),), (asked,)))
+        find_guessable_reports(Assignment("a", "A", world, Parts(), (Scenario("s", tuple(poses)),), (rule,)))
     )
     assert [warned in warning for warning in warnings] == [True] * bool(warned)
 
@@ -196,9 +198,9 @@ def test_neither_does_one_that_has_everything(rows: list[list[Any]], between: st
 @given(_ROWS | _SHARED_ROWS, st.integers(0, 5), st.sampled_from([" ", ": ", ", "]))
 def test_an_honest_report_passes(rows: list[list[Any]], place: int, between: str) -> None:
     row = rows[place % len(rows)]
-    asked = criterion("reports", expected=rows, tolerance=0.4)
-    runs = [_said(between.join(map(str, row)))] * len(rows)
-    result = judged(asked, *runs, poses=_places(len(rows)))
+    rule = criterion("reports", expected=rows, tolerance=0.4)
+    runs = [_record_speech(between.join(map(str, row)))] * len(rows)
+    result = judged(rule, *runs, poses=_places(len(rows)))
     assert result.evidence[place % len(rows)].passed, result.message
 
 
@@ -221,7 +223,7 @@ def test_an_honest_report_passes(rows: list[list[Any]], place: int, between: str
     ],
 )
 def test_what_follows_a_text_belongs_to_it(rows: list[list[Any]], text: str, right: set[int]) -> None:
-    result = judged(criterion("reports", expected=rows), *[_said(text)] * len(rows), poses=_places(len(rows)))
+    result = judged(criterion("reports", expected=rows), *[_record_speech(text)] * len(rows), poses=_places(len(rows)))
     assert {place for place, evidence in enumerate(result.evidence) if evidence.passed} == right
 
 
@@ -258,10 +260,10 @@ def test_poses_that_share_a_row_are_counted_each(counts: list[int], reported: li
     ],
 )
 def test_a_row_that_fits_most_poses_is_warned_of(expected: Any, tolerance: float, warned: str) -> None:
-    asked = replace(
+    tested_assignment = replace(
         find_assignment("black-or-grey"), criteria=(criterion("reports", expected=expected, tolerance=tolerance),)
     )
-    warnings = list(find_guessable_reports(asked))
+    warnings = list(find_guessable_reports(tested_assignment))
     assert [warned in warning for warning in warnings] == [True] * bool(warned)
 
 
@@ -281,13 +283,13 @@ _LOLLIPOP = "82.75 or 82.75 or 0 or 0 or 100 or 66.67 or 100 or 33.33"
     ],
 )
 def test_no_constant_earns_the_marks_of_the_catalogue(assignment: str, text: str) -> None:
-    asked = find_assignment(assignment)
+    graded_assignment = find_assignment(assignment)
     run = recorded(printed=(TimedText(1.0, text),), messages=talk(("IMG_DATA", text)))
     trials = tuple(
         TrialResult(each.scenario.id, each.index, 1, 0.0, 0.0, "visible", run, place=each.place)
-        for each in asked.trials()
+        for each in graded_assignment.trials()
     )
-    kinds = {each.id: each for each in asked.criteria}
-    for result in judge(asked, trials):
+    kinds = {each.id: each for each in graded_assignment.criteria}
+    for result in judge(graded_assignment, trials):
         if kinds[result.id].check == "reports":
             assert 2 * sum(evidence.passed for evidence in result.evidence) <= len(trials), result.id

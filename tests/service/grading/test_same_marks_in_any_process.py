@@ -49,8 +49,8 @@ BY_ADDRESS = (
 def _graded(runner: TrialRunner) -> list[list[object]]:
     """Return the marks and hashes that must be equal."""
     programs = BY_HASH + BY_ADDRESS * ("fixed addresses" in runner.check_sandbox())
-    asked = find_assignment("say-tm129")
-    grades = [grade(Submission("ada", SourceFile("robot.py", text)), asked, runner=runner) for text in programs]
+    assignment = find_assignment("say-tm129")
+    grades = [grade(Submission("ada", SourceFile("robot.py", text)), assignment, runner=runner) for text in programs]
     return [[str(each.marks), *(trial.recording.sha256 for trial in each.trials)] for each in grades]
 
 
@@ -66,12 +66,12 @@ _ELSEWHERE = textwrap.dedent("""
 @pytest.mark.long
 def test_six_fresh_processes_give_the_same_marks_and_hashes() -> None:
     path = os.pathsep.join([str(HELPERS), str(Path(__file__).parent)])
-    found = []
+    results = []
     for number in range(6):
         environment = os.environ | {"PYTHONPATH": path, "PYTHONHASHSEED": str(number)}
         ran = subprocess.run(
             [sys.executable, "-c", _ELSEWHERE], env=environment, capture_output=True, text=True, check=True
         )
-        found.append(json.loads(ran.stdout))
-    assert all(each == found[0] for each in found)
-    assert len({marks for marks, *_ in found[0]}) > 1
+        results.append(json.loads(ran.stdout))
+    assert all(each == results[0] for each in results)
+    assert len({marks for marks, *_ in results[0]}) > 1

@@ -81,9 +81,9 @@ def test_every_condition_has_words_and_a_place_in_the_sweep() -> None:
 def test_what_was_planned_before_there_were_sweeps_is_planned_alike() -> None:
     scenario = Scenario("s", POSES, light_noise=(0, 32), trials=2)
     plan = [(t.pose, t.light_noise, t.seed) for t in assignment(scenario).trials()]
-    asked = assignment(scenario)
+    graded_assignment = assignment(scenario)
     assert plan == [
-        (pose, noise, asked.seed(scenario, 4 * place + 2 * loud + again))
+        (pose, noise, graded_assignment.seed(scenario, 4 * place + 2 * loud + again))
         for place, pose in enumerate(POSES)
         for loud, noise in enumerate((0, 32))
         for again in range(2)
@@ -104,10 +104,10 @@ def test_shuffled_poses_come_once_each_and_jitter_stays_within_its_bounds() -> N
 
 
 def test_a_stored_assignment_keeps_its_sweep() -> None:
-    asked = find_assignment("shapes-off-centre")
-    back = decode(Assignment, encode(asked))
-    assert list(back.trials()) == list(asked.trials())
-    assert back.criteria == asked.criteria
+    graded_assignment = find_assignment("shapes-off-centre")
+    back = decode(Assignment, encode(graded_assignment))
+    assert list(back.trials()) == list(graded_assignment.trials())
+    assert back.criteria == graded_assignment.criteria
 
 
 def test_a_secret_decides_the_seeds_of_what_is_hidden_and_of_nothing_else(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ check = "finishes"
     for secret in ("", "one", "two"):
         (tmp_path / "assignment.toml").write_text(text.format(secret))
         seeds.append([trial.seed for trial in read_assignment(tmp_path).trials()])
-    assert len({shown for shown, _ in seeds}) == 1
+    assert len({each for each, _ in seeds}) == 1
     assert len({hidden for _, hidden in seeds}) == 3
 
 
@@ -183,21 +183,21 @@ def test_delay_loss_and_offset_are_felt(runner: TrialRunner) -> None:
             ("delay", {"marks_from": "falls_below", "level": 1.0}),
         )
     )
-    asked = assignment(Scenario("s", POSES[:1], sweep=sweep, seconds=5), *wanted)
+    graded_assignment = assignment(Scenario("s", POSES[:1], sweep=sweep, seconds=5), *wanted)
     submission = Submission("s", SourceFile("robot.py", SENDS_TWO), SourceFile("responder.py", SAYS_SQUARE))
-    result = grade(submission, asked, runner=runner)
+    result = grade(submission, graded_assignment, runner=runner)
     curves = {
-        found.id: [(level.at, level.right, level.n) for level in found.curves[0].levels] for found in result.criteria
+        each.id: [(level.at, level.right, level.n) for level in each.curves[0].levels] for each in result.criteria
     }
     assert curves == {
         "offset-x": [(0, 1, 1), (80, 0, 1)],
         "loss": [(0, 1, 1), (1, 0, 1)],
         "delay": [(0.1, 1, 1), (0.9, 0, 1), (3, 0, 1)],
     }
-    assert [found.marks for found in result.criteria] == [3, 3, 0]
+    assert [each.marks for each in result.criteria] == [3, 3, 0]
     assert "By message delay (s): 1.00 at 0.1, 0.00 at 0.9, 0.00 at 3." in result.criteria[2].message
     assert "2 answered, 4 late" in result.criteria[2].message
-    again = grade(submission, asked, runner=runner)
+    again = grade(submission, graded_assignment, runner=runner)
     assert [t.recording.sha256 for t in again.trials] == [t.recording.sha256 for t in result.trials]
 
 
@@ -209,6 +209,6 @@ def test_cheats_gain_where_nothing_forbids_them_and_nothing_where_it_does(runner
     got = {}
     for name in ("by-the-way-driven", "counts-the-messages", "echoes-the-patch"):
         submission = read_example("shapes-on-the-move", name)
-        results = [grade(submission, asked, runner=runner).criteria for asked in (allowing, forbidding)]
-        got[name] = [next(found.marks for found in criteria if found.id == "shapes") for criteria in results]
+        results = [grade(submission, each, runner=runner).criteria for each in (allowing, forbidding)]
+        got[name] = [next(result.marks for result in criteria if result.id == "shapes") for criteria in results]
     assert got == {"by-the-way-driven": [9, 0], "counts-the-messages": [9, 0], "echoes-the-patch": [9, 0]}

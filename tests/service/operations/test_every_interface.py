@@ -42,17 +42,17 @@ ELSEWHERE = {
     "assignments.prepare": "a part of prepare_from_catalogue and upload",
     "batches.resolve_course": "reads",
     "courses.list_own": "reads",
-    "credentials.make_token": "the page of one's own account; test_reach.py",
-    "credentials.end_credential": "the page of one's own account; test_reach.py",
-    "credentials.end_other_credentials": "the page of one's own account; test_reach.py",
+    "credentials.make_token": "the page of one's own account; test_credential_rights.py",
+    "credentials.end_credential": "the page of one's own account; test_credential_rights.py",
+    "credentials.end_other_credentials": "the page of one's own account; test_credential_rights.py",
     "people.enrol_new": "the page of one student; programs send a list",
     "people.issue_token": "the command; on the web everybody makes their own",
     "privacy.archive": "the command",
     "privacy.purge": "the command",
     "sign_in_links.make_members_link": "the command; on the web an instructor gets a link when they are added",
     "sign_in_links.make_own_link": "the command that brings the service up",
-    "sign_in.identify": "test_reach.py; pages and API, before anything else",
-    "sign_in.record_use": "the API; test_reach.py",
+    "sign_in.identify": "test_credential_rights.py; pages and API, before anything else",
+    "sign_in.record_use": "the API; test_credential_rights.py",
     "sign_in.sign_in": "the page; test_sign_in.py",
     "sign_in.sign_out": "the page; test_sign_in.py",
     "launches.begin": "learning platforms; test_lti.py",
@@ -92,8 +92,8 @@ def _members(web: Web) -> dict[str, Any]:
 
 
 def _batch(web: Web) -> dict[str, str]:
-    asked = [grading_request(who, f"print({who!r})\n") for who in ("cat", "dan")]
-    batch = intake.accept_batch(web.store, "week two", asked, (), course=COURSE, max_attempts=3)
+    requests = [grading_request(who, f"print({who!r})\n") for who in ("cat", "dan")]
+    batch = intake.accept_batch(web.store, "week two", requests, (), course=COURSE, max_attempts=3)
     return {"batch_id": batch.id, "job_id": batch.jobs[0].job_id}
 
 
@@ -212,23 +212,23 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installat
 def test_an_operation_is_the_same_by_every_interface(installation: Installation, name: str) -> None:
     row = TABLE[name]
     done = {interface: installation.run(row, interface) for interface in row.interfaces}
-    told = {interface: answer for interface, (answer, _) in done.items()}
+    answers = {interface: answer for interface, (answer, _) in done.items()}
     first = next(iter(done.values()))[1]
     for interface, (answer, left) in done.items():
         assert left == first, interface
         if row.refused is None:
-            assert answer.is_accepted, told
-            assert all(word in answer.text for word in row.says), told
+            assert answer.is_accepted, answers
+            assert all(word in answer.text for word in row.says), answers
         else:
             status, sentence = row.refused
-            assert answer.status == (2 if interface == "command" else status), told
-            assert sentence.casefold() in answer.text.casefold(), told
+            assert answer.status == (2 if interface == "command" else status), answers
+            assert sentence.casefold() in answer.text.casefold(), answers
     changes = bool(first.rows or first.notices)
     assert changes is (row.refused is None and not row.says and name not in batches.UNCHANGED), first
 
 
 def test_every_operation_has_a_row_and_every_missing_interface_a_reason() -> None:
-    found = {
+    operation_names = {
         each
         for room in pkgutil.iter_modules(operations.__path__)
         for each in vars(importlib.import_module(f"service.operations.{room.name}")).values()
@@ -237,9 +237,9 @@ def test_every_operation_has_a_row_and_every_missing_interface_a_reason() -> Non
         and [*inspect.signature(each).parameters][:2] == ["service", "actor"]
         and not each.__name__.startswith(("_", *READING))
     }
-    shown = {_name(row.operation) for row in TABLE.values()}
-    assert {_name(each) for each in found} <= shown | set(ELSEWHERE)
-    assert not shown & set(ELSEWHERE)
+    tested_operations = {_name(row.operation) for row in TABLE.values()}
+    assert {_name(each) for each in operation_names} <= tested_operations | set(ELSEWHERE)
+    assert not tested_operations & set(ELSEWHERE)
     for name, row in TABLE.items():
         assert bool(row.alone) == (row.interfaces != INTERFACES), name
 
@@ -277,6 +277,6 @@ def test_no_command_creates_a_course_from_a_mistyped_name(installation: Installa
 
 
 def test_an_export_is_the_same_by_every_interface(installation: Installation) -> None:
-    told = {interface: installation.run(TABLE["export"], interface)[0].text for interface in INTERFACES}
-    texts = {interface: text.removeprefix("\ufeff").replace("\r\n", "\n") for interface, text in told.items()}
+    page_text = {interface: installation.run(TABLE["export"], interface)[0].text for interface in INTERFACES}
+    texts = {interface: text.removeprefix("\ufeff").replace("\r\n", "\n") for interface, text in page_text.items()}
     assert texts["page"] == texts["api"] == texts["command"]

@@ -91,14 +91,14 @@ def test_whoever_has_lost_the_lease_is_told(store: Store) -> None:
         keeper.check()
         jobs.release_worker(store, "worker")
 
-        def told() -> bool:
+        def is_cancelled() -> bool:
             try:
                 keeper.check()
             except Cancelled:
                 return True
             return False
 
-        until(told)
+        until(is_cancelled)
     with store.reading() as session:
         assert session.get_one(Job, job_id).state is JobState.QUEUED
 

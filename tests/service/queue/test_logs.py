@@ -47,13 +47,13 @@ def test_a_terminal_gets_lines_for_a_person() -> None:
     ours, its = pty.openpty()
     environment = {**os.environ, "NO_COLOR": "1"}
     subprocess.run([sys.executable, "-c", _CODE], stdout=its, stderr=its, env=environment, check=True)
-    shown = os.read(ours, 65536).decode()
+    output = os.read(ours, 65536).decode()
     for end in (ours, its):
         os.close(end)
-    first, second, third = shown.splitlines()
+    first, second, third = output.splitlines()
     assert first == "ready: 2 gradings at a time"
     assert "job.lost" in second
     assert "job=j1" in second
     assert "no broker" in third
-    assert "\x1b" not in shown
-    assert "{" not in shown
+    assert "\x1b" not in output
+    assert "{" not in output

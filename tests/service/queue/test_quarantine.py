@@ -90,10 +90,10 @@ def test_a_falsified_constant_is_found_out(store: Store, runner: TrialRunner, mo
 def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_soon(
     store: Store, runner: TrialRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[str] = []
+    question_ids: list[str] = []
 
     def ask(_: TrialRunner) -> known_answers.KnownAnswer:
-        asked.append("asked")
+        question_ids.append("asked")
         return known_answers.load_known_answer()
 
     def started() -> SelfTester:
@@ -103,13 +103,13 @@ def test_who_starts_where_it_was_answered_rightly_takes_work_first_and_is_asked_
 
     monkeypatch.setattr(known_answers, "run_self_test", ask)
     started()
-    assert asked == ["asked"]
+    assert question_ids == ["asked"]
     spared = started()
     with spared.busy():
-        assert asked == ["asked"]
+        assert question_ids == ["asked"]
     monkeypatch.setattr(known_answers, "_MAX_FIRST_DELAY_SECONDS", 0.0)
     with started().busy():
-        assert asked == ["asked"] * 2
+        assert question_ids == ["asked"] * 2
 
 
 def test_one_process_of_a_home_asks_and_the_others_wait_for_its_answer(tmp_path: Path) -> None:
@@ -281,10 +281,10 @@ def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subproce
 def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submissions_again(
     tmp_path: Path, runner: TrialRunner
 ) -> None:
-    here = settings_in(tmp_path, concurrency=1, self_test_seconds=4.0, lease_seconds=6.0)
+    worker_settings = settings_in(tmp_path, concurrency=1, self_test_seconds=4.0, lease_seconds=6.0)
     switch = tmp_path / "false"
     entry = str(Path(false_worker.__file__))
-    with EmbeddedBroker(here) as broker, open_store(here) as store:
+    with EmbeddedBroker(worker_settings) as broker, open_store(worker_settings) as store:
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
 
         def submit(speeds: range) -> list[str]:

@@ -207,12 +207,12 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         busy = until(lambda: [pid for pid in _pool_children(worker) if _has_student(pid)])
         for pid in busy:
             os.kill(pid, signal.SIGSTOP)
-        until(lambda: next((found for found in service.jobs(batch) if found.attempt == 2), None))
+        until(lambda: next((each for each in service.jobs(batch) if each.attempt == 2), None))
         for pid in busy:
             os.kill(pid, signal.SIGCONT)
         service.wait(batch)
         service.assert_graded_once(batch)
-        assert [found.id for found in service.jobs(batch)] == [job.id]
+        assert [each.id for each in service.jobs(batch)] == [job.id]
 
 
 def _has_student(pool_child: int) -> bool:
@@ -228,7 +228,7 @@ def test_a_cancelled_job_stops(service: Service) -> None:
     assert acting.cancel(service.store, batch).running == 1
     after = service.submit([grading_request("after")])
     service.wait(after)
-    assert [found.state for found in service.jobs(batch)] == [JobState.CANCELLED]
+    assert [each.state for each in service.jobs(batch)] == [JobState.CANCELLED]
     with service.store.reading() as session:
         assert session.scalar(select(func.count()).select_from(TrialRow).where(TrialRow.job_id == job.id)) == 0
 

@@ -15,9 +15,9 @@ PAGE = ROOT / "docs" / "operators.md"
 
 
 def test_every_metric_is_in_the_table(store: Store) -> None:
-    shown = set(re.findall(r"^\| `(robomark_\w+)` \|", PAGE.read_text(), re.MULTILINE))
-    told = {
+    document = set(re.findall(r"^\| `(robomark_\w+)` \|", PAGE.read_text(), re.MULTILINE))
+    documented_metrics = {
         family.name + ("_total" if family.type == "counter" else "")
         for family in text_string_to_metric_families(render_metrics(service_on(store)).decode())
     }
-    assert shown == told
+    assert document == documented_metrics

@@ -47,18 +47,18 @@ def _first_words(up: subprocess.Popen[str]) -> tuple[str, str]:
     """Return the address that the service prints first, and its complete output."""
     assert up.stdout is not None
     first = up.stdout.readline()
-    found = re.search(r"http://[\w.:]+", first)
-    assert found is not None, first + (up.stderr.read() if up.stderr and up.poll() is not None else "")
-    return found[0], first
+    match = re.search(r"http://[\w.:]+", first)
+    assert match is not None, first + (up.stderr.read() if up.stderr and up.poll() is not None else "")
+    return match[0], first
 
 
 def _ready(up: subprocess.Popen[str]) -> str:
     address, first = _first_words(up)
     # Output that goes to no terminal may go to a log that others read.
     assert "rml_" not in first
-    told = Path(json.loads(first)["message"].partition("sign in with the link in ")[2])
-    assert stat.S_IMODE(told.stat().st_mode) == 0o600
-    link = told.read_text().strip()
+    document = Path(json.loads(first)["message"].partition("sign in with the link in ")[2])
+    assert stat.S_IMODE(document.stat().st_mode) == 0o600
+    link = document.read_text().strip()
     assert re.fullmatch(re.escape(address) + r"/sign-in/rml_[\w-]+", link)
     until(lambda: "This link signs you in as" in _get(link)[1])
     assert up.stdout is not None
@@ -112,14 +112,14 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
             store, "spinning", [grading_request("spinner", SPIN), grading_request("next", SPIN)], [], max_attempts=3
         )
         until(lambda: _jobs(store, JobState.RUNNING))
-        told = _metrics(address)
-        assert told["robomark_jobs_open", "batch", "running"] == 1
-        assert told["robomark_queue_depth", "batch"] == 1
-        assert told["robomark_queue_oldest_seconds", "batch"] > 0
-        assert told["robomark_jobs_ended_total", "interactive", "done"] == 1
-        assert told["robomark_verdicts_total", "finished"] == 1
-        assert told["robomark_phase_seconds", "trials", "0.95"] > 0
-        assert told["robomark_workers",] == 1
+        metrics_text = _metrics(address)
+        assert metrics_text["robomark_jobs_open", "batch", "running"] == 1
+        assert metrics_text["robomark_queue_depth", "batch"] == 1
+        assert metrics_text["robomark_queue_oldest_seconds", "batch"] > 0
+        assert metrics_text["robomark_jobs_ended_total", "interactive", "done"] == 1
+        assert metrics_text["robomark_verdicts_total", "finished"] == 1
+        assert metrics_text["robomark_phase_seconds", "trials", "0.95"] > 0
+        assert metrics_text["robomark_workers",] == 1
 
         # A second service reports where the first one runs, and changes nothing.
         second = subprocess.run(
@@ -218,5 +218,5 @@ def test_what_cannot_be_served_is_said(
     monkeypatch.setattr(sys, "argv", ["robomark", *arguments])
     with pytest.raises(SystemExit) as ended:
         main()
-    shown = capsys.readouterr()
-    assert (ended.value.code, shown.out, shown.err.count("\n")) == (2, "", 1)
+    captured = capsys.readouterr()
+    assert (ended.value.code, captured.out, captured.err.count("\n")) == (2, "", 1)

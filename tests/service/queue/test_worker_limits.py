@@ -61,8 +61,8 @@ def _job(store: Store, job_id: str) -> Job:
 @pytest.mark.long
 def test_a_pool_child_that_hangs_is_ended_and_its_slot_comes_back(tmp_path: Path) -> None:
     home = asked_already(tmp_path / "home")
-    here = settings_in(home, concurrency=1, lease_seconds=1.0, job_seconds=2.0, notify_seconds=0.5)
-    with EmbeddedBroker(here) as broker, open_store(here) as store:
+    worker_settings = settings_in(home, concurrency=1, lease_seconds=1.0, job_seconds=2.0, notify_seconds=0.5)
+    with EmbeddedBroker(worker_settings) as broker, open_store(worker_settings) as store:
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
         hanging = _submit(store, notifier, hanging_worker.HANGS, "print('on')\n")
         with _worker(broker.settings, str(Path(hanging_worker.__file__))):
@@ -77,8 +77,8 @@ def test_a_pool_child_that_hangs_is_ended_and_its_slot_comes_back(tmp_path: Path
 
 @pytest.mark.long
 def test_a_worker_begins_nothing_once_the_tables_are_too_new_for_it(tmp_path: Path) -> None:
-    here = settings_in(asked_already(tmp_path / "home"), concurrency=1)
-    with EmbeddedBroker(here) as broker, open_store(here) as store:
+    worker_settings = settings_in(asked_already(tmp_path / "home"), concurrency=1)
+    with EmbeddedBroker(worker_settings) as broker, open_store(worker_settings) as store:
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
         running = _submit(store, notifier, "ada", DRIVES_LONG)
         with _worker(broker.settings, "-m", "service.queue.worker") as log:

@@ -106,11 +106,11 @@ def _rows_of_json(text: str) -> dict[str, str]:
 
 
 def _rows_of_junit(text: str) -> dict[str, str]:
-    found = {}
+    rows = {}
     for suite in JUnitXml.fromstring(text.encode()):
-        told = {each.name: each.value for each in suite.properties()}  # type: ignore[no-untyped-call]
-        found[told.get("student", "")] = told.get("reason", "")
-    return found
+        properties = {each.name: each.value for each in suite.properties()}  # type: ignore[no-untyped-call]
+        rows[properties.get("student", "")] = properties.get("reason", "")
+    return rows
 
 
 @pytest.mark.parametrize(
@@ -225,11 +225,11 @@ def test_gradescope_takes_each_document_of_one_submission() -> None:
 
 def test_who_was_refused_reads_what_was_found_and_what_to_do() -> None:
     page = render_refusal_page(ZOE)
-    told = re.sub(r"\s+", " ", re.sub(r"<style>.*</style>|<[^>]+>", " ", page, flags=re.DOTALL))
-    assert "Zoë Ångström shape-recognition Your submission was not graded." in told
-    assert "Problem has no robot.py." in told
-    assert "Expected robot.py (a robot program)." in told
-    assert "submit again" in told
+    page_text = re.sub(r"\s+", " ", re.sub(r"<style>.*</style>|<[^>]+>", " ", page, flags=re.DOTALL))
+    assert "Zoë Ångström shape-recognition Your submission was not graded." in page_text
+    assert "Problem has no robot.py." in page_text
+    assert "Expected robot.py (a robot program)." in page_text
+    assert "submit again" in page_text
     hostile = render_refusal_page(
         replace(ZOE, student=Student(build.HOSTILE), source=build.HOSTILE, reason=build.HOSTILE)
     )
@@ -263,7 +263,7 @@ def test_no_gradebook_has_a_word_that_is_for_staff(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "changes", "told", "for_staff"),
+    ("state", "changes", "words", "for_staff"),
     [
         (JobState.DEAD, {"error": "Tried 3 times, the last time: /srv is full"}, "could not be graded yet", False),
         (JobState.CANCELLED, {"error": "the batch was cancelled"}, "was cancelled", False),
@@ -273,16 +273,16 @@ def test_no_gradebook_has_a_word_that_is_for_staff(name: str) -> None:
     ],
 )
 def test_what_a_student_is_told_of_a_job_without_a_grade(
-    store: Store, state: JobState, changes: dict[str, str], told: str, for_staff: bool
+    store: Store, state: JobState, changes: dict[str, str], words: str, for_staff: bool
 ) -> None:
     accepted = accept_one(store)
     with store.reading() as session:
         line = replace(job_lines.load_job_line(session, accepted.job_id), state=state, **changes)  # type: ignore[arg-type]
     row = build_row(line, None, describe_missing_grade(line))
-    (shown,) = select_student_rows([row]) or [row]
+    (student_rows,) = select_student_rows([row]) or [row]
     assert row.for_staff is for_staff
-    if told:
-        assert shown.reason.startswith(told)
-        assert all(text not in shown.reason for text in changes.values())
+    if words:
+        assert student_rows.reason.startswith(words)
+        assert all(text not in student_rows.reason for text in changes.values())
     else:
-        assert shown.reason == row.reason
+        assert student_rows.reason == row.reason

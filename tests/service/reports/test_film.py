@@ -52,9 +52,9 @@ def test_the_robot_heads_where_it_did() -> None:
 
 def test_time_is_as_long_as_it_was_and_the_last_frame_stays() -> None:
     image = Image.open(io.BytesIO(render_film(trial_of(build.line_follower_recording(90)), {})))
-    shown = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
-    assert sum(shown[:-1]) == pytest.approx(3000, abs=2 * FRAME_MILLISECONDS)
-    assert shown[-1] == 2000
+    durations = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
+    assert sum(durations[:-1]) == pytest.approx(3000, abs=2 * FRAME_MILLISECONDS)
+    assert durations[-1] == 2000
     assert image.info["loop"] == 0
     assert image.width == 640
 

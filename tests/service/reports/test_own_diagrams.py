@@ -40,7 +40,7 @@ SEED = (
 )
 
 
-def found(text: str, kind: DiagramKind = "seqdiag") -> Differences | None:
+def find_differences(text: str, kind: DiagramKind = "seqdiag") -> Differences | None:
     return compare_with_recording(read_diagram(kind, text), count_messages(build.shape_grade().trials[0].recording))
 
 
@@ -82,21 +82,21 @@ def talk_grade(*messages: Message, calls: tuple[Call, ...] = ()) -> Grade:
     ],
 )  # fmt: skip
 def test_differences_in_words(text: str, sentence: str) -> None:
-    told = found(text.replace("agent -> digit_net [label = 'a network']", "agent -> digit_net"))
-    assert told is not None
-    assert describe_differences(told) == sentence
+    differences = find_differences(text.replace("agent -> digit_net [label = 'a network']", "agent -> digit_net"))
+    assert differences is not None
+    assert describe_differences(differences) == sentence
 
 
 def test_a_way_may_lead_through_who_is_not_drawn() -> None:
-    told = found("robot <-> python <-> mlp", "blockdiag")
-    assert told is not None
-    assert told.drawn_arrows == ()
-    assert found("robot <-> python <-> mlp; agent", "blockdiag").drawn_arrows == (("python", "mlp"),)  # type: ignore[union-attr]
+    differences = find_differences("robot <-> python <-> mlp", "blockdiag")
+    assert differences is not None
+    assert differences.drawn_arrows == ()
+    assert find_differences("robot <-> python <-> mlp; agent", "blockdiag").drawn_arrows == (("python", "mlp"),)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("text", ["input -> hidden -> output", "robot -> charger", "a -> b"])
 def test_a_diagram_of_something_else_is_not_compared(text: str) -> None:
-    assert found(text) is None
+    assert find_differences(text) is None
 
 
 def test_long_lists_are_cut() -> None:
@@ -112,14 +112,14 @@ def test_talks_are_counted_with_what_was_lost() -> None:
         Message(1.0, "robot", "PY::2", 1.0),
         Message(2.0, "robot", "PY::3", None),
     )
-    told = count_messages(talk_grade(*messages, calls=calls).trials[0].recording)
-    assert told == (
+    message_counts = count_messages(talk_grade(*messages, calls=calls).trials[0].recording)
+    assert message_counts == (
         MessageCount("robot", "responder", "message", 3, 1),
         MessageCount("responder", "robot", "message", 1),
         MessageCount("responder", "parser", "call", 2),
         MessageCount("parser", "responder", "return", 1),
     )
-    drawn = build_block_diagram(told)
+    drawn = build_block_diagram(message_counts)
     assert [(arrow.label, arrow.heads) for arrow in drawn.arrows] == [
         ("3, 1 lost", "target"),
         ("1", "target"),

@@ -55,25 +55,29 @@ def test_recognition_has_its_plots() -> None:
 def test_confusion_tells_precision_and_recall_and_what_n_counts() -> None:
     accuracy = Accuracy(0.5, 0.2, 0.8, 8, ("a", "b"), (("a", "a", 3), ("a", "b", 1), ("b", "b", 1), ("b", None, 3)))
     result = CriterionResult("c", "C", build.shape_grade().marks, build.shape_grade().marks, "")
-    shown = draw_confusion(result, accuracy, "t").texts
-    assert {"precision", "recall", ".75", ".25", ".50", "1"} <= set(shown)  # b: recall 1 of 4, precision 1 of 2
-    assert any("n = 8 images" in text for text in shown)
+    confusion = draw_confusion(result, accuracy, "t").texts
+    assert {"precision", "recall", ".75", ".25", ".50", "1"} <= set(confusion)  # b: recall 1 of 4, precision 1 of 2
+    assert any("n = 8 images" in text for text in confusion)
 
 
 def test_a_misread_image_stands_beside_the_nearest_right_ones() -> None:
     grade = build.shape_grade(wrong=4)
-    (found,) = find_misread(grade.criteria[0].predictions)
-    assert (found.number, found.prediction.truth, found.prediction.answer) == (5, "upwards facing triangle", "diamond")
-    assert found.like_truth is None
-    assert found.like_answer is not None
-    assert found.like_answer.truth == "diamond"
-    shown = draw_misread([found], 6, "t").texts
-    assert {"misread", "correct,\nsame truth", "correct,\nsame answer", "none", "5. ✗ wrong"} <= set(shown)
-    assert any("1 misread of n = 6 images" in text for text in shown)
+    (misread,) = find_misread(grade.criteria[0].predictions)
+    assert (misread.number, misread.prediction.truth, misread.prediction.answer) == (
+        5,
+        "upwards facing triangle",
+        "diamond",
+    )
+    assert misread.like_truth is None
+    assert misread.like_answer is not None
+    assert misread.like_answer.truth == "diamond"
+    actual = draw_misread([misread], 6, "t").texts
+    assert {"misread", "correct,\nsame truth", "correct,\nsame answer", "none", "5. ✗ wrong"} <= set(actual)
+    assert any("1 misread of n = 6 images" in text for text in actual)
     # Of two correct images of a class, the nearer one is shown.
-    far = replace(found.like_answer, image=replace(found.like_answer.image, left=b"\x80" * 1600))
+    far = replace(misread.like_answer, image=replace(misread.like_answer.image, left=b"\x80" * 1600))
     (again,) = find_misread((far, *grade.criteria[0].predictions))
-    assert again.like_answer is found.like_answer
+    assert again.like_answer is misread.like_answer
 
 
 def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
@@ -89,9 +93,9 @@ def test_a_track_shows_every_image_and_the_share_along_the_way() -> None:
     curve = compute_accuracy_curve([*collect_track_images(predictions, grade.trials, 0), *images])
     assert sum(curve.n) == len(predictions)
     assert all(low <= share <= high for low, share, high in zip(curve.low, curve.share, curve.high, strict=True))
-    shown = draw_track(predictions, grade.trials, "t", build_floor("Simple_Shapes").pixels).texts
-    assert {"x, mm", "y, mm", "distance driven, mm", "accuracy"} <= set(shown)
-    assert any(f"of n = {len(predictions)} images correct, 2 trials" in text for text in shown)
+    track = draw_track(predictions, grade.trials, "t", build_floor("Simple_Shapes").pixels).texts
+    assert {"x, mm", "y, mm", "distance driven, mm", "accuracy"} <= set(track)
+    assert any(f"of n = {len(predictions)} images correct, 2 trials" in text for text in track)
 
 
 def test_standing_still_is_no_track() -> None:

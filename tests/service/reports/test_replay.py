@@ -40,14 +40,14 @@ def with_recording(grade: Grade, recording: Recording) -> Grade:
 
 def test_columns_come_back_as_near_as_a_canvas_needs() -> None:
     recording = build.line_follower_recording(300)
-    told = build_run_replay(recording, "robot.py", 0, Sources(), {})["trials"][0]
-    columns = told["robots"][0]["columns"]
+    trial = build_run_replay(recording, "robot.py", 0, Sources(), {})["trials"][0]
+    columns = trial["robots"][0]["columns"]
     assert columns.keys() == {each.display_attribute for each in COLUMNS}
     for name, column in columns.items():
         wanted = np.asarray(getattr(recording.ticks, name)).reshape(300, -1)
         assert np.abs(values_of(column) - wanted).max() <= 0.5 / column["per"] + 1e-9, name
     assert columns["x"]["per"] == 100
-    assert told["robots"][0]["pen"] == ((30, True), (200, False))
+    assert trial["robots"][0]["pen"] == ((30, True), (200, False))
 
 
 def test_what_is_not_known_stays_unknown() -> None:
@@ -69,8 +69,8 @@ def test_a_minute_is_small_and_ten_minutes_with_500_images_are_not_refused() -> 
     minute = with_recording(build.line_follower_grade(2), long_recording(1800))
     assert len(render_report_page(build_student_view(minute), {})) < 400 * KIB
     long = with_recording(build.line_follower_grade(2), long_recording(18_000, images=500))
-    found = data_of(render_report_page(build_student_view(long), {}))
-    assert len(found["trials"][0]["robots"][0]["images"]) == 500
+    document = data_of(render_report_page(build_student_view(long), {}))
+    assert len(document["trials"][0]["robots"][0]["images"]) == 500
 
 
 def test_a_report_has_the_worst_trial_and_as_many_others_as_there_is_room_for() -> None:
@@ -101,23 +101,26 @@ def test_staff_alone_learn_what_our_own_code_stumbled_over() -> None:
 
 
 def test_a_stand_in_is_not_told_as_a_responder_and_what_is_said_is_told_once() -> None:
-    asked = Message(1.0, "robot", "PY::0", 1.0)
+    message = Message(1.0, "robot", "PY::0", 1.0)
     answer = Message(1.0, "responder", "pingpong PY::0", 1.0, reply_to=0)
     recording = replace(
         build.line_follower_recording(3),
-        messages=(asked, answer),
+        messages=(message, answer),
         printed=(TimedText(1.0, "PY::0"), TimedText(1.5, "there")),
         spoken=(TimedText(1.5, "there"),),
     )
-    (told,) = run(recording)["trials"]
-    assert [(each["from"], each["to"]) for each in told["messages"]] == [("robot", "simulator"), ("simulator", "robot")]
-    assert [(each["kind"], each["text"]) for each in told["events"]] == [("printed", "PY::0"), ("said", "there")]
+    (trial,) = run(recording)["trials"]
+    assert [(each["from"], each["to"]) for each in trial["messages"]] == [
+        ("robot", "simulator"),
+        ("simulator", "robot"),
+    ]
+    assert [(each["kind"], each["text"]) for each in trial["events"]] == [("printed", "PY::0"), ("said", "there")]
     assert build_transcript(recording) == [
         (1.0, "PY::0"),
         (1.0, "(answer of the simulator) pingpong PY::0"),
         (1.5, "(says) there"),
     ]
-    answered = replace(recording, messages=(asked, replace(answer, text="circle")))
+    answered = replace(recording, messages=(message, replace(answer, text="circle")))
     assert run(answered)["trials"][0]["messages"][1]["from"] == "responder"
     assert (1.0, "(answer) circle") in build_transcript(answered)
 
@@ -151,10 +154,10 @@ def test_a_link_leads_only_to_a_trial_that_is_there(monkeypatch: pytest.MonkeyPa
 
 def test_images_have_their_pixels_and_what_they_were_taken_for() -> None:
     grade = build.shape_grade(wrong=4)
-    told = build_grade_replay(build_student_view(grade))["trials"][4]["robots"][0]["images"][0]
-    assert (told["truth"], told["answer"]) == ("upwards facing triangle", "diamond")
+    grade_replay = build_grade_replay(build_student_view(grade))["trials"][4]["robots"][0]["images"][0]
+    assert (grade_replay["truth"], grade_replay["answer"]) == ("upwards facing triangle", "diamond")
     rgba = np.frombuffer(grade.trials[4].recording.images[0].left, np.uint8).reshape(-1, 4)
-    assert base64.b64decode(told["left"]) == rgba[:, :3].tobytes()
+    assert base64.b64decode(grade_replay["left"]) == rgba[:, :3].tobytes()
 
 
 def test_messages_have_both_ends_and_what_befell_them() -> None:
@@ -201,9 +204,9 @@ def test_speech_and_prints_are_told_apart_and_faults_name_their_cell() -> None:
     files = collect_file_sources(
         SourceFile("robot.py", "print('one')\nsay('one')\n"), SourceFile("responder.py", "print('one')\n")
     )
-    found = files.find_writing_line("one", is_spoken=True)
-    assert found is not None
-    assert (found.source, found.line) == (0, 2)
+    writing_line = files.find_writing_line("one", is_spoken=True)
+    assert writing_line is not None
+    assert (writing_line.source, writing_line.line) == (0, 2)
     cells = (Cell(1, "import x"), Cell(2, " "), Cell(3, "%%sim_magic_preloaded -b Loop\nprint('go')"))
     notebook = collect_sources(Submission("s", notebook=Notebook("n.ipynb", cells)))
     assert [source.name for source in notebook.shown] == ["cell 1", "cell 3"]
@@ -219,10 +222,10 @@ def test_hostile_texts_are_visible_and_capped() -> None:
     )
     submission = replace(build.faulty_submission(), program=endless)
     page = render_report_page(build_student_view(build.hostile_grade()), {}, submission)
-    told = json.dumps(data_of(page), ensure_ascii=False)
-    assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(told)
-    assert "\\\\u202eevil" in told
-    assert "WWWW… (199," in told
+    document = json.dumps(data_of(page), ensure_ascii=False)
+    assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(document)
+    assert "\\\\u202eevil" in document
+    assert "WWWW… (199," in document
     assert data_of(page)["sources"][0]["more"] == 9001 - 3000
     assert data_of(page)["trials"][0]["left_out"] == 3001 - 2000
     assert len(compress_replay(data_of(page))) < 100_000
@@ -248,8 +251,8 @@ def test_both_robots_are_there_and_say_who_they_are() -> None:
 def test_a_floor_of_the_assignments_own_is_shown_and_a_lost_one_left_white() -> None:
     recording = replace(build.line_follower_recording(3), background="own.png")
     photograph = np.random.default_rng(0).integers(0, 256, (1143, 2362, 3), np.uint8)
-    (shown,) = build_run_replay(recording, "r", 0, Sources(), {"own.png": photograph})["floors"]
-    assert shown["image"].startswith("data:image/webp;base64,")
+    (floor,) = build_run_replay(recording, "r", 0, Sources(), {"own.png": photograph})["floors"]
+    assert floor["image"].startswith("data:image/webp;base64,")
     (lost,) = build_run_replay(recording, "r", 0, Sources(), {})["floors"]
     assert lost == {"name": "own.png", "image": None}
 
@@ -281,10 +284,10 @@ def test_the_line_of_a_text_is_looked_up_and_not_searched_for() -> None:
     lines = [f"print('{number} is said'); " * 10 for number in range(3000)]
     sources = collect_file_sources(SourceFile("robot.py", "\n".join([*lines[:-1], "print('2999 is said')"])), None)
     began = time.process_time()
-    found = [sources.find_writing_line(f"{number} is said") for _ in range(2) for number in range(3000)]
+    writing_lines = [sources.find_writing_line(f"{number} is said") for _ in range(2) for number in range(3000)]
     assert time.process_time() - began < 5
-    assert found[2999] == found[-1] == Place(0, 3000)
-    assert set(found) == {None, Place(0, 3000)}
+    assert writing_lines[2999] == writing_lines[-1] == Place(0, 3000)
+    assert set(writing_lines) == {None, Place(0, 3000)}
 
 
 def test_a_wheel_position_of_any_size_is_told() -> None:

@@ -89,45 +89,45 @@ def pose_at(recording: Recording, t: float) -> tuple[float, float]:
 
 def assert_robot_is_there(page: Page, recording: Recording, t: float) -> None:
     wanted = on_canvas(page, *pose_at(recording, t))
-    found = page.evaluate(MIDDLE, AXLE_COLOUR)
-    assert max(abs(found[0] - wanted[0]), abs(found[1] - wanted[1])) <= 1, t
+    position = page.evaluate(MIDDLE, AXLE_COLOUR)
+    assert max(abs(position[0] - wanted[0]), abs(position[1] - wanted[1])) <= 1, t
 
 
 def now(page: Page) -> float:
     return float(page.locator(".moment").evaluate("slider => slider.valueAsNumber"))
 
 
-def assert_quiet(found: OpenPage, file: Path) -> None:
-    assert [asked.partition("#")[0] for asked in found.asked] == [file.as_uri()]
-    assert found.complaints == []
+def assert_quiet(opened_page: OpenPage, file: Path) -> None:
+    assert [each.partition("#")[0] for each in opened_page.requests] == [file.as_uri()]
+    assert opened_page.complaints == []
 
 
 def test_the_robot_is_where_the_recording_has_it_at_twenty_moments(browser: Browser, line_report: Path) -> None:
     recording = build.line_follower_grade().trials[0].recording
-    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as opened_page:
         for view in ("path", "floor"):
-            found.page.locator("select").nth(2).select_option(view)
+            opened_page.page.locator("select").nth(2).select_option(view)
             for tick in range(0, 300, 15):
-                found.page.evaluate(SEEK, tick / 30)
-                assert_robot_is_there(found.page, recording, tick / 30)
-        found.page.locator("select").nth(2).select_option("near")
-        found.page.evaluate(SEEK, 5)
-        assert_robot_is_there(found.page, recording, 5)
-        assert_quiet(found, line_report)
+                opened_page.page.evaluate(SEEK, tick / 30)
+                assert_robot_is_there(opened_page.page, recording, tick / 30)
+        opened_page.page.locator("select").nth(2).select_option("near")
+        opened_page.page.evaluate(SEEK, 5)
+        assert_robot_is_there(opened_page.page, recording, 5)
+        assert_quiet(opened_page, line_report)
 
 
 def test_the_floor_lies_where_the_robot_drives(browser: Browser, line_report: Path) -> None:
     pixels = build_floor("Lollipop").pixels
     chance = np.random.default_rng(1)
-    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
-        found.page.locator("select").nth(2).select_option("floor")
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as opened_page:
+        opened_page.page.locator("select").nth(2).select_option("floor")
         compared = set()
         for x, y in chance.integers((900, 300), (2300, 1100), (400, 2)).tolist():
             around = pixels[1143 - y - 8 : 1143 - y + 8, x - 8 : x + 8].reshape(-1, 3)
             if (around != around[0]).any():
                 continue
-            at_x, at_y = on_canvas(found.page, x, y)
-            seen = found.page.evaluate(PIXEL, [round(at_x), round(at_y)])
+            at_x, at_y = on_canvas(opened_page.page, x, y)
+            seen = opened_page.page.evaluate(PIXEL, [round(at_x), round(at_y)])
             if np.abs(np.array(seen[:3]) - around[0]).max() <= 3:
                 compared.add(tuple(around[0].tolist()))
         assert len(compared) >= 3  # paper, line, and a bar of another colour
@@ -135,8 +135,8 @@ def test_the_floor_lies_where_the_robot_drives(browser: Browser, line_report: Pa
 
 def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report: Path) -> None:
     recording = build.line_follower_grade().trials[1].recording
-    with opened(browser, line_report, **DESKTOP) as found:
-        page = found.page
+    with opened(browser, line_report, **DESKTOP) as opened_page:
+        page = opened_page.page
         page.get_by_role("link", name="Watch trial 2 at 4.00 s").focus()
         page.keyboard.press("Enter")
         expect(page.locator(".moment")).to_be_focused()
@@ -152,10 +152,10 @@ def test_the_failed_second_is_reached_by_keyboard(browser: Browser, line_report:
         assert now(page) == pytest.approx(4)
         assert_robot_is_there(page, recording, 4)
         assert "touched" in page.locator(".happened li").first.inner_text()
-        told = page.locator(".moment").get_attribute("aria-valuetext")
-        assert told is not None
-        assert told.startswith("4.00 of 10.00 s; x ")
-        assert_quiet(found, line_report)
+        value_text = page.locator(".moment").get_attribute("aria-valuetext")
+        assert value_text is not None
+        assert value_text.startswith("4.00 of 10.00 s; x ")
+        assert_quiet(opened_page, line_report)
 
 
 def test_in_german_nothing_is_said_in_english(browser: Browser, tmp_path: Path) -> None:
@@ -167,31 +167,31 @@ def test_in_german_nothing_is_said_in_english(browser: Browser, tmp_path: Path) 
         )
     )
     spoken, english = translate_labels(german)["sentences"], translate_labels(ENGLISH)["sentences"]
-    with opened(browser, file, **DESKTOP) as found:
-        page = found.page
+    with opened(browser, file, **DESKTOP) as opened_page:
+        page = opened_page.page
         page.get_by_role("link", name="Lauf 2 bei 4.00 s ansehen").press("Enter")
         expect(page.locator(".moment")).to_be_focused()
         page.get_by_text(spoken["allAsTable"]).click()
         expect(page.get_by_role("columnheader", name=spoken["cameOfIt"])).to_be_visible()
-        told = page.locator(".moment").get_attribute("aria-valuetext")
-        assert told is not None
-        assert told.startswith("4.00 von 10.00 s; x ")
-        assert "Richtung" in told
+        value_text = page.locator(".moment").get_attribute("aria-valuetext")
+        assert value_text is not None
+        assert value_text.startswith("4.00 von 10.00 s; x ")
+        assert "Richtung" in value_text
         assert "Roboter: berührt" in page.locator(".happened li").first.inner_text()
         for name in ("play", "pause"):
             button = page.get_by_role("button", name=spoken[name])
             expect(button).to_be_visible()
             button.click()
-        shown = page.locator("section.replay").inner_text()
+        output = page.locator("section.replay").inner_text()
         ours = {words for key, words in english.items() if words != spoken[key] and len(words) > 8 and "%" not in words}
-        assert {words for words in ours if words in shown} == set()
-        assert_quiet(found, file)
+        assert {words for words in ours if words in output} == set()
+        assert_quiet(opened_page, file)
 
 
 def test_the_slider_is_moved_by_touch(browser: Browser, line_report: Path) -> None:
     recording = build.line_follower_grade().trials[1].recording
-    with opened(browser, line_report, "#trial=2&t=0", **PHONE) as found:
-        page = found.page
+    with opened(browser, line_report, "#trial=2&t=0", **PHONE) as opened_page:
+        page = opened_page.page
         moments = set()
         for part in range(20):
             box = page.locator(".moment").bounding_box()
@@ -203,12 +203,12 @@ def test_the_slider_is_moved_by_touch(browser: Browser, line_report: Path) -> No
         page.locator(".losses a").tap()
         assert now(page) == pytest.approx(4)
         assert page.evaluate("document.documentElement.scrollWidth") == 390
-        assert_quiet(found, line_report)
+        assert_quiet(opened_page, line_report)
 
 
 def test_playing_ends_at_the_end_and_starts_again(browser: Browser, line_report: Path) -> None:
-    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
-        page = found.page
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as opened_page:
+        page = opened_page.page
         page.locator("select").nth(1).select_option("50")
         page.locator(".moment").focus()
         page.keyboard.press("Space")
@@ -222,23 +222,23 @@ def test_playing_ends_at_the_end_and_starts_again(browser: Browser, line_report:
 
 
 def test_the_link_to_the_moment_follows_while_it_plays(browser: Browser, line_report: Path) -> None:
-    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as found:
-        found.page.get_by_role("button", name="Play").click()
-        link = found.page.get_by_role("link", name="Link to this moment")
+    with opened(browser, line_report, "#trial=1&t=0", **DESKTOP) as opened_page:
+        opened_page.page.get_by_role("button", name="Play").click()
+        link = opened_page.page.get_by_role("link", name="Link to this moment")
         expect(link).not_to_have_attribute("href", "#trial=1&t=0")
-        found.page.wait_for_function(
+        opened_page.page.wait_for_function(
             "() => { const shown = document.querySelector('.moment').valueAsNumber;"
             " const link = document.querySelector('.choices a').hash; return shown > 0.2"
             " && Math.abs(new URLSearchParams(link.slice(1)).get('t') - shown) < 0.1; }"
         )
-        assert_quiet(found, line_report)
+        assert_quiet(opened_page, line_report)
 
 
 def test_with_reduced_motion_it_plays_in_stills(browser: Browser, line_report: Path) -> None:
-    with opened(browser, line_report, reduced_motion="reduce", **DESKTOP) as found:
-        page = found.page
+    with opened(browser, line_report, reduced_motion="reduce", **DESKTOP) as opened_page:
+        page = opened_page.page
         page.locator(".play").click()
-        shown = page.evaluate("""() => new Promise((resolve) => {
+        frame_times = page.evaluate("""() => new Promise((resolve) => {
           const shown = new Set();
           const until = performance.now() + 2000;
           const look = () => {
@@ -248,7 +248,7 @@ def test_with_reduced_motion_it_plays_in_stills(browser: Browser, line_report: P
           };
           look();
         })""")
-        assert 2 <= shown <= 6
+        assert 2 <= frame_times <= 6
 
 
 @WIDTHS
@@ -261,12 +261,12 @@ def test_ten_minutes_with_500_images_can_be_scrubbed(browser: Browser, tmp_path:
             build_student_view(replace(grade, trials=(replace(grade.trials[0], recording=recording),), criteria=())), {}
         )
     )
-    with opened(browser, file, "#t=599.5", **context) as found:
-        assert now(found.page) == pytest.approx(599.5)
-        assert_robot_is_there(found.page, recording, 599.5)
-        found.page.keyboard.press("Home")
-        assert_robot_is_there(found.page, recording, 0)
-        assert_quiet(found, file)
+    with opened(browser, file, "#t=599.5", **context) as opened_page:
+        assert now(opened_page.page) == pytest.approx(599.5)
+        assert_robot_is_there(opened_page.page, recording, 599.5)
+        opened_page.page.keyboard.press("Home")
+        assert_robot_is_there(opened_page.page, recording, 0)
+        assert_quiet(opened_page, file)
 
 
 @WIDTHS
@@ -286,16 +286,16 @@ def test_hostile_texts_run_nothing_and_break_nothing(browser: Browser, tmp_path:
     for name, page in pages.items():
         file = tmp_path / name
         file.write_text(page)
-        with opened(browser, file, **context) as found:
-            shown = found.page
+        with opened(browser, file, **context) as opened_page:
+            replay_page = opened_page.page
             for t in (0, 0.1, 0.4, 1.5):
-                shown.evaluate(SEEK, t)
-            shown.locator("section.replay .events summary").click()
-            expect(shown.locator(".events tbody tr").nth(3)).to_be_visible()
-            assert shown.locator("section.replay img, section.replay iframe").count() == 0
-            assert shown.evaluate("document.scripts.length") == 2
-            assert shown.evaluate("document.documentElement.scrollWidth") <= context["viewport"]["width"]
-            assert_quiet(found, file)
+                replay_page.evaluate(SEEK, t)
+            replay_page.locator("section.replay .events summary").click()
+            expect(replay_page.locator(".events tbody tr").nth(3)).to_be_visible()
+            assert replay_page.locator("section.replay img, section.replay iframe").count() == 0
+            assert replay_page.evaluate("document.scripts.length") == 2
+            assert replay_page.evaluate("document.documentElement.scrollWidth") <= context["viewport"]["width"]
+            assert_quiet(opened_page, file)
 
 
 @WIDTHS
@@ -304,11 +304,11 @@ def test_axe_finds_nothing(browser: Browser, tmp_path: Path, context: dict[str, 
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     file = tmp_path / "report.html"
     file.write_text(render_report_page(build_student_view(build.astray_grade()), {}, build.faulty_submission()))
-    with opened(browser, file, "#trial=2&t=0.5", color_scheme=scheme, **context) as found:
-        found.page.locator("section.replay .events summary").click()
-        found.page.evaluate(axe)
-        expect(found.page.locator(".events tbody tr").first).to_be_visible()
-        wrong = found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)")
+    with opened(browser, file, "#trial=2&t=0.5", color_scheme=scheme, **context) as opened_page:
+        opened_page.page.locator("section.replay .events summary").click()
+        opened_page.page.evaluate(axe)
+        expect(opened_page.page.locator(".events tbody tr").first).to_be_visible()
+        wrong = opened_page.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)")
         assert wrong == []
 
 
@@ -333,28 +333,28 @@ def test_the_other_robot_is_where_its_recording_has_it(
     browser: Browser, report_of_two: Path, context: dict[str, Any]
 ) -> None:
     mine, other = (grade.trials[0].recording for grade in (build.line_follower_grade(), parting_grade()))
-    with opened(browser, report_of_two, "#trial=1&t=0", **context) as found:
-        found.page.locator("select").nth(2).select_option("floor")
+    with opened(browser, report_of_two, "#trial=1&t=0", **context) as opened_page:
+        opened_page.page.locator("select").nth(2).select_option("floor")
         for t in (4.5, 5, 5.5, 6.1, 7, 7.3):
-            found.page.evaluate(SEEK, t)
-            assert_both_are_there(found.page, mine, other, t)
-        found.page.locator("select").nth(2).select_option("path")
+            opened_page.page.evaluate(SEEK, t)
+            assert_both_are_there(opened_page.page, mine, other, t)
+        opened_page.page.locator("select").nth(2).select_option("path")
         for t in (5, 8, 9.9, 10.5, 12):  # the first robot's trial ends at 10 s
-            found.page.evaluate(SEEK, t)
-            assert_both_are_there(found.page, mine, other, t)
-        assert_quiet(found, report_of_two)
+            opened_page.page.evaluate(SEEK, t)
+            assert_both_are_there(opened_page.page, mine, other, t)
+        assert_quiet(opened_page, report_of_two)
 
 
 def test_the_other_trial_is_switched_off_and_on_by_keyboard(browser: Browser, report_of_two: Path) -> None:
-    with opened(browser, report_of_two, "#trial=1&t=11.5", **DESKTOP) as found:
-        page = found.page
+    with opened(browser, report_of_two, "#trial=1&t=11.5", **DESKTOP) as opened_page:
+        page = opened_page.page
         page.locator("section.replay .events summary").click()
         rows = page.locator(".events tbody tr.of-over")
         assert (now(page), rows.count()) == (11.5, 3)
         expect(page.locator(".happened .of-over").first).to_contain_text("attempt 1: robot: said")
-        told = page.locator(".moment").get_attribute("aria-valuetext")
-        assert told is not None
-        assert "attempt 1 " in told
+        value_text = page.locator(".moment").get_attribute("aria-valuetext")
+        assert value_text is not None
+        assert "attempt 1 " in value_text
         box = page.get_by_role("checkbox", name="Overlay attempt 1")
         box.focus()
         page.keyboard.press("Space")
@@ -372,8 +372,8 @@ def test_where_they_part_is_a_link_to_the_moment(browser: Browser, report_of_two
     mine, other = (grade.trials[1].recording for grade in (build.line_follower_grade(), parting_grade()))
     moment = find_divergence(mine, other)
     assert moment is not None
-    with opened(browser, report_of_two, "#trial=2&t=0", **DESKTOP) as found:
-        page = found.page
+    with opened(browser, report_of_two, "#trial=2&t=0", **DESKTOP) as opened_page:
+        page = opened_page.page
         page.get_by_role("link", name="First difference: 3.13 s").focus()
         page.keyboard.press("Enter")
         assert moment <= now(page) < moment + 0.001
@@ -392,14 +392,14 @@ def test_hostile_texts_of_the_other_trial_run_nothing(
     )
     file = tmp_path / "replay.html"
     file.write_text(render_replay_page(poisoned(honest, HOSTILE)))
-    with opened(browser, file, "#trial=2&t=0.5", **context) as found:
-        page = found.page
+    with opened(browser, file, "#trial=2&t=0.5", **context) as opened_page:
+        page = opened_page.page
         page.locator("section.replay .events summary").click()
         expect(page.locator(".events tbody tr.of-over").first).to_be_visible()
         assert page.evaluate("document.scripts.length") == 2
         assert page.locator("section.replay img, section.replay iframe").count() == 0
         assert page.evaluate("document.documentElement.scrollWidth") <= context["viewport"]["width"]
-        assert_quiet(found, file)
+        assert_quiet(opened_page, file)
 
 
 @WIDTHS
@@ -408,8 +408,8 @@ def test_axe_finds_nothing_in_two_trials(
     browser: Browser, report_of_two: Path, context: dict[str, Any], scheme: str
 ) -> None:
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
-    with opened(browser, report_of_two, "#trial=2&t=6", color_scheme=scheme, **context) as found:
-        found.page.locator("section.replay .events summary").click()
-        found.page.evaluate(axe)
-        expect(found.page.locator(".events tbody tr.of-over").first).to_be_visible()
-        assert found.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)") == []
+    with opened(browser, report_of_two, "#trial=2&t=6", color_scheme=scheme, **context) as opened_page:
+        opened_page.page.locator("section.replay .events summary").click()
+        opened_page.page.evaluate(axe)
+        expect(opened_page.page.locator(".events tbody tr.of-over").first).to_be_visible()
+        assert opened_page.page.evaluate("async () => (await axe.run()).violations.map((each) => each.id)") == []

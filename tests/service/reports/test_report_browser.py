@@ -42,24 +42,24 @@ def test_a_phone_shows_the_cause_at_once_and_the_details_after_three_screens(
     browser: Browser, tmp_path: Path, name: str
 ) -> None:
     file = written(name, tmp_path)
-    with opened(browser, file, **PHONE) as found:
+    with opened(browser, file, **PHONE) as opened_page:
         top = "(name) => document.querySelector(name).getBoundingClientRect().bottom"
-        assert found.page.evaluate(top, ".verdict") < 844
-        assert found.page.evaluate("document.querySelector('.details').getBoundingClientRect().top") <= 3 * 844
-        assert found.page.evaluate("document.documentElement.scrollWidth") == 390
-        assert not found.complaints
-        assert found.asked == [file.as_uri()]
+        assert opened_page.page.evaluate(top, ".verdict") < 844
+        assert opened_page.page.evaluate("document.querySelector('.details').getBoundingClientRect().top") <= 3 * 844
+        assert opened_page.page.evaluate("document.documentElement.scrollWidth") == 390
+        assert not opened_page.complaints
+        assert opened_page.requests == [file.as_uri()]
 
 
 @pytest.mark.parametrize("name", ["shape", "line_follower"])
 def test_type_in_pictures_is_at_least_eleven_pixels_high_on_a_phone(
     browser: Browser, tmp_path: Path, name: str
 ) -> None:
-    with opened(browser, written(name, tmp_path), **PHONE) as found:
-        found.page.evaluate(OPEN_ALL)
-        shown = found.page.evaluate("[...document.images].map((each) => each.clientWidth / each.naturalWidth)")
-        assert shown
-        assert all(share * DPI / 72 * _SMALLEST >= 11 for share in shown)
+    with opened(browser, written(name, tmp_path), **PHONE) as opened_page:
+        opened_page.page.evaluate(OPEN_ALL)
+        scales = opened_page.page.evaluate("[...document.images].map((each) => each.clientWidth / each.naturalWidth)")
+        assert scales
+        assert all(share * DPI / 72 * _SMALLEST >= 11 for share in scales)
 
 
 @pytest.mark.parametrize("context", [DESKTOP, PHONE], ids=["desktop", "phone"])
@@ -69,20 +69,20 @@ def test_axe_finds_nothing_when_all_is_open(
     browser: Browser, tmp_path: Path, name: str, context: dict[str, Any], scheme: str
 ) -> None:
     axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
-    with opened(browser, written(name, tmp_path), color_scheme=scheme, **context) as found:
-        found.page.evaluate(OPEN_ALL)
-        found.page.evaluate(axe)
-        wrong = found.page.evaluate(
+    with opened(browser, written(name, tmp_path), color_scheme=scheme, **context) as opened_page:
+        opened_page.page.evaluate(OPEN_ALL)
+        opened_page.page.evaluate(axe)
+        wrong = opened_page.page.evaluate(
             "async () => (await axe.run()).violations.flatMap((each) => each.nodes.map((node) => [each.id, node.html]))"
         )
         assert wrong == []
 
 
 def test_closed_details_are_printed_open_and_without_a_marker(browser: Browser, tmp_path: Path) -> None:
-    with opened(browser, written("faulty", tmp_path), **DESKTOP) as found:
-        found.page.emulate_media(media="print")
+    with opened(browser, written("faulty", tmp_path), **DESKTOP) as opened_page:
+        opened_page.page.emulate_media(media="print")
         closed = "document.querySelector('.details details:not([open])')"
-        assert found.page.evaluate(f"getComputedStyle({closed}.querySelector('summary')).listStyleType") == "none"
+        assert opened_page.page.evaluate(f"getComputedStyle({closed}.querySelector('summary')).listStyleType") == "none"
         heights = f"[{closed}.offsetHeight, {closed}.querySelector('summary').offsetHeight]"
-        details_height, summary_height = found.page.evaluate(heights)
+        details_height, summary_height = opened_page.page.evaluate(heights)
         assert details_height > 1.5 * summary_height

@@ -223,8 +223,8 @@ def test_batch_index_links_and_escapes() -> None:
 
 def test_an_excused_criterion_is_neither_won_nor_lost() -> None:
     grade = build.line_follower_grade()
-    said = StaffAdjustment(Decimal(0), grade.criteria[0].max_marks, "The floor was wet.", excused=True)
-    first = replace(grade.criteria[0], marks=Decimal(0), max_marks=Decimal(0), set_by_hand=said)
+    adjustment = StaffAdjustment(Decimal(0), grade.criteria[0].max_marks, "The floor was wet.", excused=True)
+    first = replace(grade.criteria[0], marks=Decimal(0), max_marks=Decimal(0), set_by_hand=adjustment)
     view = build_student_view(replace(grade, criteria=(first, *grade.criteria[1:])))
     assert build_page(view).criteria[0].state == "excused"
     lost = [loss["title"] for trial in build_grade_replay(view)["trials"] for loss in trial["lost"]]

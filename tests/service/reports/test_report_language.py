@@ -34,14 +34,14 @@ _NO_SENTENCE = {"Robomark", "JSON", "IMG", "DATA"}
 class Foreign(gettext.NullTranslations):
     """Puts every translated text into angle brackets, and records the texts."""
 
-    said: set[str] = field(default_factory=set)
+    sentences: set[str] = field(default_factory=set)
 
     def gettext(self, message: str) -> str:
-        self.said.add(message)
+        self.sentences.add(message)
         return f"⟨{message}⟩"
 
     def ngettext(self, one: str, many: str, count: int) -> str:
-        self.said.add(one)
+        self.sentences.add(one)
         return f"⟨{one if count == 1 else many}⟩"
 
 
@@ -112,8 +112,8 @@ def test_nothing_of_ours_is_said_in_another_language(made: Callable[[], Grade], 
     kept = {word for text in (*texts_in(grade), add_hidden_note("")) for word in _WORD.findall(text)}
     for view in (build_staff_view(grade, language), build_student_view(grade, language=language)):
         page = page_of(view)
-        shown = [*Texts(page).found, *texts_of_replay(data_of(page) if view.grade.trials else {})]
-        left = {word for text in shown for word in _WORD.findall(unbracketed(text))}
+        document = [*Texts(page).found, *texts_of_replay(data_of(page) if view.grade.trials else {})]
+        left = {word for text in document for word in _WORD.findall(unbracketed(text))}
         assert left - kept - _NO_SENTENCE == set()
 
 
@@ -121,7 +121,7 @@ def test_everything_that_is_said_is_in_the_catalogues(foreign: Foreign) -> None:
     for made in GRADES:
         page_of(build_staff_view(made(), Language("xx", foreign)))
     known = {each.id if isinstance(each.id, str) else each.id[0] for each in extract_messages() if each.id}
-    assert foreign.said - known == {"°"}, "what is said inside an f-string is not found"
+    assert foreign.sentences - known == {"°"}, "what is said inside an f-string is not found"
 
 
 def test_a_german_report_is_german() -> None:

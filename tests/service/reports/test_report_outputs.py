@@ -55,9 +55,9 @@ LOST = (
 def test_every_report_says_what_the_channel_lost_and_why() -> None:
     view = build_staff_view(build.astray_grade())
     assert LOST in " ".join(render_plain_text(view).split())
-    shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(render_rich_report(view))
-    assert LOST in shown.export_text()
+    console = Console(width=400, record=True, file=io.StringIO())
+    console.print(render_rich_report(view))
+    assert LOST in console.export_text()
     assert LOST in " ".join(render_report_page(view, {}).split())
     messages = build_json_document(view)["trials"][1]["messages"]
     assert messages[0] == {"t": 0.1, "sender": "robot", "text": "PY::0", "lost": "chance"}
@@ -70,17 +70,17 @@ def test_every_report_says_what_the_channel_lost_and_why() -> None:
 def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
     made = build.shape_grade()
     full = replace(made, criteria=tuple(replace(each, marks=each.max_marks) for each in made.criteria))
-    shown = Console(width=400, record=True, file=io.StringIO())
-    shown.print(render_rich_report(build_staff_view(full)))
+    console = Console(width=400, record=True, file=io.StringIO())
+    console.print(render_rich_report(build_staff_view(full)))
     document = FORMATS[form].document if form in FORMATS else None
-    told = (
+    outputs = (
         document(full)
         if document
         else render_report_page(build_student_view(full), {})
         if form == "page"
-        else shown.export_text()
+        else console.export_text()
     )
-    words = " ".join(re.sub("<script.*?</script>", "", told, flags=re.DOTALL).split())
+    words = " ".join(re.sub("<script.*?</script>", "", outputs, flags=re.DOTALL).split())
     assert "missing" not in words
     assert "to be gained" not in words
     if form in ("text", "gradescope", "page", "terminal"):
@@ -170,9 +170,9 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
 
 def test_terminals_get_no_control_codes_from_students() -> None:
     grade = build.hostile_grade()
-    for shown in (render_plain_text(build_staff_view(grade)), _on_a_terminal(build_staff_view(grade))):
-        assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(shown)
-        assert "[red]x[/red]" in shown
+    for each in (render_plain_text(build_staff_view(grade)), _on_a_terminal(build_staff_view(grade))):
+        assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(each)
+        assert "[red]x[/red]" in each
 
 
 def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:

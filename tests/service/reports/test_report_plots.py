@@ -144,15 +144,15 @@ def test_a_path_that_leaves_the_floor_says_so() -> None:
         end=Pose(9000, 800, 0),
     )
     ticks = replace(far.ticks, y=np.full(90, 800.0))
-    shown = draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None).texts
-    assert "the path continues outside this image" in shown
+    path = draw_path(TrialResult("a", 0, 1, 0, 0, "visible", replace(far, ticks=ticks)), "t", None).texts
+    assert "the path continues outside this image" in path
     draw_path(TrialResult("a", 0, 1, 0, 0, "visible", far), "t", None)  # no finite tick except the start
 
 
 def test_path_tells_units_start_end_and_images() -> None:
-    shown = draw_path(build.shape_grade().trials[4], "Shapes: path", None).texts
-    assert {"x, mm", "y, mm", "start", "end", "image sent", "Shapes: path", "1"} <= set(shown)
-    assert any("from (520, 900) heading 0°" in text for text in shown)
+    path = draw_path(build.shape_grade().trials[4], "Shapes: path", None).texts
+    assert {"x, mm", "y, mm", "start", "end", "image sent", "Shapes: path", "1"} <= set(path)
+    assert any("from (520, 900) heading 0°" in text for text in path)
 
 
 def test_sensor_panels_and_events() -> None:
@@ -162,15 +162,15 @@ def test_sensor_panels_and_events() -> None:
     assert distance.curves[0].values[0] == recording.ticks.ultrasonic[0] / 10
     assert np.array_equal(wheels.curves[1].values, recording.ticks.right_position)
     assert [strip.label for strip in build_strips(recording)] == ["said", "touch"]
-    shown = draw_sensors(build.line_follower_grade().trials[1], "t").texts
-    assert {"Ultrasonic, cm", "Reflected light, red 0–255", "simulated time, s"} <= set(shown)
+    sensors = draw_sensors(build.line_follower_grade().trials[1], "t").texts
+    assert {"Ultrasonic, cm", "Reflected light, red 0–255", "simulated time, s"} <= set(sensors)
 
 
 def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
     trial = build.shape_grade().trials[4]
-    told = build_conversation(trial.recording)
-    assert told.parties == ("robot", "responder", "parser", "agent", "logger", "network")
-    arrows = [(step.kind, step.source, step.target) for step in told.steps if isinstance(step, Step)]
+    conversation = build_conversation(trial.recording)
+    assert conversation.parties == ("robot", "responder", "parser", "agent", "logger", "network")
+    arrows = [(step.kind, step.source, step.target) for step in conversation.steps if isinstance(step, Step)]
     assert arrows == [
         ("message", "robot", "responder"),
         ("call", "responder", "parser"),
@@ -182,8 +182,8 @@ def test_conversation_names_each_party_once_and_orders_nested_calls() -> None:
         ("call", "responder", "logger"),
         ("message", "responder", "robot"),
     ]
-    shown = _texts(draw_diagram(build_sequence_diagram(told), "t", "", Highlights()))
-    assert all(shown.count(party) == 1 for party in told.parties)
+    texts = _texts(draw_diagram(build_sequence_diagram(conversation), "t", "", Highlights()))
+    assert all(texts.count(party) == 1 for party in conversation.parties)
     inner = [
         line.sender
         for line in build_page(build_staff_view(build.shape_grade())).scenes[0].messages
@@ -212,8 +212,8 @@ def test_of_many_tries_the_one_that_got_through_is_shown() -> None:
 
 
 def test_lost_messages_are_told_apart() -> None:
-    told = build_conversation(build.faulty_grade().trials[1].recording)
-    kinds = [step.kind for step in told.steps if isinstance(step, Step)]
+    conversation = build_conversation(build.faulty_grade().trials[1].recording)
+    kinds = [step.kind for step in conversation.steps if isinstance(step, Step)]
     assert kinds == ["message", "lost", "message", "silence", "lost"]
     (talk, *_) = (scene for scene in build_page(build_staff_view(build.faulty_grade())).scenes if scene.messages)
     assert [line.arrived for line in talk.messages if line.kind == "wrong"] == ["never (lost)", "never (lost)"]
@@ -227,12 +227,12 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
         messages.append(
             Message(float(count), "responder", f"saw {count}", arrived, 2 * count, "" if arrived else "lost")
         )
-    told = build_conversation(_talk(*messages))
-    assert (told.shown, told.total) == (6, 40)
-    labels = [step.label for step in told.steps if isinstance(step, Step)]
+    conversation = build_conversation(_talk(*messages))
+    assert (conversation.shown, conversation.total) == (6, 40)
+    labels = [step.label for step in conversation.steps if isinstance(step, Step)]
     assert "PY::0" in labels
     assert "saw 30" in labels
-    gaps = [step.count for step in told.steps if isinstance(step, Gap)]
+    gaps = [step.count for step in conversation.steps if isinstance(step, Gap)]
     assert sum(gaps) == 34
     trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
     (scene,) = build_page(build_staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes
@@ -240,10 +240,10 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
 
 
 def test_answers_to_nothing_and_strange_indices_are_shown_too() -> None:
-    told = build_conversation(
+    conversation = build_conversation(
         _talk(Message(0.0, "responder", "hello", 0.1, 7), Message(0.2, "responder", "again", 0.3))
     )
-    assert [step.label for step in told.steps if isinstance(step, Step)] == ["hello", "again"]
+    assert [step.label for step in conversation.steps if isinstance(step, Step)] == ["hello", "again"]
 
 
 def test_confusion_counts_totals_and_missing_answers() -> None:
@@ -252,9 +252,9 @@ def test_confusion_counts_totals_and_missing_answers() -> None:
     assert table.answers == ("a", "b", "zebra", "no answer")
     assert table.counts == ((2, 0, 0, 0), (0, 0, 1, 1))
     assert table.totals == (2, 2)
-    shown = draw_confusion(build.shape_grade().criteria[0], accuracy, "t").texts
-    assert any("accuracy 0.50, 95 % interval 0.20 to 0.80, n = 4" in text for text in shown)
-    assert "no answer" in shown
+    confusion = draw_confusion(build.shape_grade().criteria[0], accuracy, "t").texts
+    assert any("accuracy 0.50, 95 % interval 0.20 to 0.80, n = 4" in text for text in confusion)
+    assert "no answer" in confusion
 
 
 def test_sensor_images_and_focus() -> None:

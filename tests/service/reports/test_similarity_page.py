@@ -65,9 +65,9 @@ def test_pairs_beyond_the_most_are_counted() -> None:
 
 
 def test_json_has_everything() -> None:
-    (told,) = json.loads(json.dumps(similarity_to_json(build_similarity_view([FOUND]))))
-    (pair,) = told["pairs"]
-    assert told["too_short"] == ["cyd"]
+    (document,) = json.loads(json.dumps(similarity_to_json(build_similarity_view([FOUND]))))
+    (pair,) = document["pairs"]
+    assert document["too_short"] == ["cyd"]
     assert (pair["students"], pair["share"]) == (list(BOTH), 0.75)
     assert pair["sources"][0]["stretches"] == [{"lines": [2, 3], "other_lines": [1, 4], "tokens": 60}]
     assert pair["trials"][0]["trial"] == {"scenario": "<u>line", "index": 0, "noisy": True}
@@ -89,12 +89,12 @@ def test_no_grade_and_no_view_of_one_can_have_it_in_it() -> None:
 
 def _within(kind: object) -> set[type]:
     """Return all dataclasses that a value of this type can contain."""
-    found: set[type] = set()
+    types: set[type] = set()
     waiting = [kind]
     while waiting:
         each = waiting.pop()
         waiting += typing.get_args(each)
-        if isinstance(each, type) and dataclasses.is_dataclass(each) and each not in found:
-            found.add(each)
+        if isinstance(each, type) and dataclasses.is_dataclass(each) and each not in types:
+            types.add(each)
             waiting += typing.get_type_hints(each, localns={"NDArray": NDArray, "np": np}).values()
-    return found
+    return types

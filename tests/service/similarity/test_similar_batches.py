@@ -74,29 +74,29 @@ def _compared(programs: Mapping[str, str], runner: TrialRunner, trials: int) -> 
 @pytest.mark.parametrize("trials", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_a_copy_that_was_rewritten_is_found_by_its_path_and_its_recordings(runner: TrialRunner, trials: int) -> None:
     original = EDGE_FOLLOWER.format(speed=17, gain=0.37, edge=46)
-    found = _compared({**_edge_followers(8), "ada": original, "eva": WRAPPED}, runner, trials)
-    assert [pair.students for pair in found.pairs] == [("ada", "eva")]
-    assert found.same_recordings == (("ada", "eva"),)
+    similarity = _compared({**_edge_followers(8), "ada": original, "eva": WRAPPED}, runner, trials)
+    assert [pair.students for pair in similarity.pairs] == [("ada", "eva")]
+    assert similarity.same_recordings == (("ada", "eva"),)
 
 
 @pytest.mark.parametrize("trials", [1, 2])
 def test_students_who_use_the_follower_of_the_lecture_are_no_pair(runner: TrialRunner, trials: int) -> None:
     lecture = EDGE_FOLLOWER.format(speed=14, gain=0.4, edge=50)
-    found = _compared({**_edge_followers(8), **dict.fromkeys(("ada", "bob", "cyd"), lecture)}, runner, trials)
-    assert found.pairs == ()
+    similarity = _compared({**_edge_followers(8), **dict.fromkeys(("ada", "bob", "cyd"), lecture)}, runner, trials)
+    assert similarity.pairs == ()
     # A fact that is listed with its number of students.
-    assert found.same_recordings == (("ada", "bob", "cyd"),)
+    assert similarity.same_recordings == (("ada", "bob", "cyd"),)
 
 
 @pytest.mark.parametrize("others", [0, 8])
 def test_one_way_in_three_spellings_is_no_pair(runner: TrialRunner, others: int) -> None:
     squares = {f"square-{number}": f"%%sim_magic_preloaded\n{text}" for number, text in enumerate(SQUARES)}
-    found = _compared({**_edge_followers(others), **squares}, runner, 1)
-    assert found.pairs == ()
-    assert found.same == ()
-    assert found.same_recordings == (tuple(squares),)
-    assert "no pairs" not in describe_similarity(found)
-    assert "1 group with a common file or common recordings" in describe_similarity(found)
+    similarity = _compared({**_edge_followers(others), **squares}, runner, 1)
+    assert similarity.pairs == ()
+    assert similarity.same == ()
+    assert similarity.same_recordings == (tuple(squares),)
+    assert "no pairs" not in describe_similarity(similarity)
+    assert "1 group with a common file or common recordings" in describe_similarity(similarity)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def trials(*recordings: Recording) -> list[TrialResult]:
     return [TrialResult("line", place, place, 10.0, 0.0, "visible", each) for place, each in enumerate(recordings)]
 
 
-def said(text: str) -> Recording:
+def record_speech(text: str) -> Recording:
     return replace(STILL, printed=(TimedText(0.1, text),), messages=(Message(0.1, "robot", text, 0.2),))
 
 
@@ -44,8 +44,8 @@ def driven(ticks: int) -> Recording:
 
 
 def test_a_path_that_only_two_drove_is_named_with_its_trial() -> None:
-    found = same([[driven(30)], [driven(30)], *([driven(31 + number)] for number in range(8))])
-    assert found == {("s00", "s01"): (SharedBehaviour(TrialName("line", 0, True), "path", 2, 10),)}
+    pairs = same([[driven(30)], [driven(30)], *([driven(31 + number)] for number in range(8))])
+    assert pairs == {("s00", "s01"): (SharedBehaviour(TrialName("line", 0, True), "path", 2, 10),)}
 
 
 def test_a_path_that_many_drove_says_nothing() -> None:
@@ -62,11 +62,11 @@ def test_of_few_students_nothing_is_said() -> None:
 def test_messages_and_faults_are_compared_by_themselves() -> None:
     fault = Fault(0.5, Verdict.PROGRAM_ERROR, "program", "NameError: name 'mottor' is not defined", 3)
     failed = replace(driven(20), verdict=Verdict.PROGRAM_ERROR, faults=(fault,))
-    alone = [[said(f"mine {number}")] for number in range(8)]
-    ours, theirs = replace(said("PY::1"), faults=(fault,), verdict=Verdict.PROGRAM_ERROR), failed
+    alone = [[record_speech(f"mine {number}")] for number in range(8)]
+    ours, theirs = replace(record_speech("PY::1"), faults=(fault,), verdict=Verdict.PROGRAM_ERROR), failed
     (both,) = same([[ours], [theirs], *alone]).values()
     assert [each.aspect for each in both] == ["faults"]
-    (both,) = same([[said("PY::1")], [said("PY::1")], *alone]).values()
+    (both,) = same([[record_speech("PY::1")], [record_speech("PY::1")], *alone]).values()
     assert [each.aspect for each in both] == ["messages"]
 
 

@@ -25,9 +25,9 @@ def of_two(one: str, other: str, given: tuple[str, ...] = ()) -> SourceCompariso
     )
 
 
-def alike(found: SourceComparison) -> SimilarSources:
-    assert found.too_short == ()
-    (pair,) = found.alike
+def alike(comparison: SourceComparison) -> SimilarSources:
+    assert comparison.too_short == ()
+    (pair,) = comparison.alike
     return pair
 
 
@@ -59,10 +59,10 @@ def test_a_copy_is_found_however_it_is_disguised(how: str, assignment: str, name
     ],
 )
 def test_honest_solutions_of_one_assignment_are_not_alike(assignment: str, one: str, other: str) -> None:
-    found = of_two(
+    comparison = of_two(
         example(assignment, one), example(assignment, other), collect_given_code(find_assignment(assignment))
     )
-    assert found == SourceComparison((), ())
+    assert comparison == SourceComparison((), ())
 
 
 def test_a_copied_part_of_a_larger_source_is_found() -> None:
@@ -141,9 +141,9 @@ def test_names_numbers_texts_and_layout_do_not_count() -> None:
 )
 def test_what_is_no_python_is_compared_too_and_nothing_hangs(text: str) -> None:
     began = time.process_time()
-    found = of_two(text, text)
+    comparison = of_two(text, text)
     assert len(tokenise_source(text)) <= MAX_TOKENS
-    assert all(pair.share == 1 for pair in found.alike)
+    assert all(pair.share == 1 for pair in comparison.alike)
     assert time.process_time() - began < 20
 
 
@@ -157,8 +157,8 @@ def test_only_candidates_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(similar_sources, "_compare_pair", counted)
     sources: list[Source] = [build_source(str(number), "robot.py", program(number)) for number in range(200)]
-    found = compare_sources([*sources, build_source("eve", "robot.py", program(7))], [])
-    assert [pair.students for pair in found.alike] == [("7", "eve")]
+    comparison = compare_sources([*sources, build_source("eve", "robot.py", program(7))], [])
+    assert [pair.students for pair in comparison.alike] == [("7", "eve")]
     assert len(compared) == 1
 
 
@@ -171,8 +171,8 @@ def test_of_too_many_pairs_those_with_most_in_common_are_compared(monkeypatch: p
         build_source("eve", "robot.py", program(3)),
         build_source("ivy", "robot.py", f"{program(4)}\n{program(5)}"),
     ]
-    found = compare_sources(sources, [])
-    assert (len(found.alike), found.not_compared) == (2, 2)
+    comparison = compare_sources(sources, [])
+    assert (len(comparison.alike), comparison.not_compared) == (2, 2)
 
 
 def test_a_file_that_groups_share_is_named_however_many_copied_it() -> None:
@@ -182,10 +182,10 @@ def test_a_file_that_groups_share_is_named_however_many_copied_it() -> None:
         build_source(f"s{number:02}", "robot.py", f"{shared}\n{program(number % 5, 3)}\n# no {number}")
         for number in range(30)
     ]
-    found = compare_sources(sources, ())
-    assert found.alike == ()
-    assert found.same == tuple(tuple(f"s{number:02}" for number in range(first, 30, 5)) for first in range(5))
-    assert found.too_short == ()
+    comparison = compare_sources(sources, ())
+    assert comparison.alike == ()
+    assert comparison.same == tuple(tuple(f"s{number:02}" for number in range(first, 30, 5)) for first in range(5))
+    assert comparison.too_short == ()
     assert compare_sources(sources, (shared, *(program(number, 3) for number in range(5)))).same == ()
     everybody = [build_source(f"s{number}", "robot.py", shared) for number in range(9)]
     assert compare_sources(everybody, ()).same == ()

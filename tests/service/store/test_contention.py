@@ -151,9 +151,9 @@ def _second_waits(store: Store, first: Callable[[Session], object], second: Call
     with ThreadPoolExecutor(1) as pool:
         with store.transaction() as session:
             first(session)
-            asked = pool.submit(second)
-            until(lambda: asked.done() or _waiting(store))
-        return asked
+            second_future = pool.submit(second)
+            until(lambda: second_future.done() or _waiting(store))
+        return second_future
 
 
 @pytest.fixture
@@ -192,9 +192,9 @@ def test_of_two_who_change_the_same_marks_at_once_the_second_is_refused(
         with server.transaction() as session:
             later(session, job_id, "hopper", seen)
 
-    asked = _second_waits(server, lambda session: first(session, job_id, "grace", seen), second)
+    second_future = _second_waits(server, lambda session: first(session, job_id, "grace", seen), second)
     with pytest.raises(UsageError, match="Another person changed the marks"):
-        asked.result()
+        second_future.result()
 
 
 @pytest.mark.long
@@ -210,9 +210,9 @@ def test_what_two_do_at_once_that_is_done_once_the_second_is_refused(
         with server.transaction() as session:
             change(session, job_id, "hopper", seen)
 
-    asked = _second_waits(server, lambda session: change(session, job_id, "grace", seen), second)
+    second_future = _second_waits(server, lambda session: change(session, job_id, "grace", seen), second)
     with pytest.raises(UsageError, match=refused):
-        asked.result()
+        second_future.result()
 
 
 def _set_policy(session: Session) -> None:
@@ -268,11 +268,11 @@ def test_one_student_tries_one_program_at_a_time(server: Store) -> None:
         with server.transaction() as session:
             test_runs.queue_test_run(session, enrolment_id, version_id, b"")
 
-    asked = _second_waits(
+    second_future = _second_waits(
         server, lambda session: test_runs.queue_test_run(session, enrolment_id, version_id, b""), second
     )
     with pytest.raises(UsageError, match="not completed yet"):
-        asked.result()
+        second_future.result()
 
 
 def _one_submission(store: Store) -> tuple[int, int]:
@@ -291,8 +291,8 @@ def test_an_attempt_that_is_claimed_while_the_next_comes_in_counts_alone(
         policies.set_policy(session, 1, "", PolicyLimits(attempts=1))
     claims: list[jobs.Claim | None] = []
 
-    def rule_then_claim(*asked: Any) -> policies.Ruling:
-        ruling = policies.apply_policy(*asked)
+    def rule_then_claim(*arguments: Any) -> policies.Ruling:
+        ruling = policies.apply_policy(*arguments)
         claims.append(jobs.claim_job(server, "worker", 60))
         return ruling
 
@@ -320,19 +320,19 @@ def test_a_submission_over_a_limit_is_either_graded_for_staff_or_removed_for_a_n
         with server.transaction() as session:
             return jobs.queue_over_limit_job(session, over_limit, datetime.now(UTC))
 
-    asked: list[Future[bool]] = []
+    futures: list[Future[bool]] = []
     with ThreadPoolExecutor(1) as pool:
 
         def ask_then_delete(table: type[Base]) -> Delete:
-            if not asked:
-                asked.append(pool.submit(ask_for_grade))
-                until(lambda: asked[0].done() or _waiting(server))
+            if not futures:
+                futures.append(pool.submit(ask_for_grade))
+                until(lambda: futures[0].done() or _waiting(server))
             return delete(table)
 
         monkeypatch.setattr(intake, "delete", ask_then_delete)
         submit(3)
     with server.reading() as session:
-        assert asked[0].result() == (session.get(Job, over_limit) is not None)
+        assert futures[0].result() == (session.get(Job, over_limit) is not None)
 
 
 class _Deadlock(Exception):
@@ -382,10 +382,10 @@ def _calls(name: str) -> Iterator[tuple[str, ast.Call]]:
 
 def test_no_lock_keeps_foreign_keys_from_being_checked() -> None:
     """``FOR UPDATE`` blocks the ``KEY SHARE`` lock of a foreign key check; ``key_share=True`` does not."""
-    found = dict(_calls("with_for_update"))
-    assert len(found) > 5
-    weak = {where for where, call in found.items() if {"key_share", "read"} & {each.arg for each in call.keywords}}
-    assert set(found) == weak
+    lock_calls = dict(_calls("with_for_update"))
+    assert len(lock_calls) > 5
+    weak = {where for where, call in lock_calls.items() if {"key_share", "read"} & {each.arg for each in call.keywords}}
+    assert set(lock_calls) == weak
     for where, call in _calls("get_one"):
         assert not any(
             each.arg == "with_for_update" and isinstance(each.value, ast.Constant) for each in call.keywords

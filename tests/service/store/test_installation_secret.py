@@ -37,17 +37,17 @@ SECRET = "a-secret-of-32-characters-9c41e7"
 ECHO = locate_examples("echo-responder") / "reference"
 
 
-def _put_secret(settings: Settings, found: Queue[str]) -> None:
+def _put_secret(settings: Settings, secrets_queue: Queue[str]) -> None:
     with open_store(settings) as store:
-        found.put(load_secret(store).text)
+        secrets_queue.put(load_secret(store).text)
 
 
 def test_all_who_start_at_once_agree(service_settings: Settings) -> None:
-    found: Queue[str] = FORKING.Queue()
-    processes = [FORKING.Process(target=_put_secret, args=(service_settings, found)) for _ in range(4)]
+    secrets_queue: Queue[str] = FORKING.Queue()
+    processes = [FORKING.Process(target=_put_secret, args=(service_settings, secrets_queue)) for _ in range(4)]
     for process in processes:
         process.start()
-    secrets = {found.get(timeout=120) for _ in processes}
+    secrets = {secrets_queue.get(timeout=120) for _ in processes}
     for process in processes:
         process.join()
     (secret,) = secrets
@@ -113,8 +113,8 @@ def test_settings_do_not_tell_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     monkeypatch.setenv("ROBOMARK_SECRET", f"  {SECRET}\n")
     settings = load_settings(home=tmp_path)
     assert settings.own_secret == Secret(SECRET)
-    for told in (repr(settings), str(settings), settings.to_environment(), repr(settings.own_secret), vars(settings)):
-        assert SECRET not in str(told)
+    for each in (repr(settings), str(settings), settings.to_environment(), repr(settings.own_secret), vars(settings)):
+        assert SECRET not in str(each)
     monkeypatch.setenv("ROBOMARK_SECRET", " ")
     assert load_settings().own_secret is None
 
@@ -148,20 +148,22 @@ def told():
 def test_student_code_does_not_come_by_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The seed of its world is not available either, because the world could be rebuilt from it at home."""
     monkeypatch.setenv("ROBOMARK_SECRET", SECRET)
-    asked = find_assignment("echo-responder")
-    asked = type(asked)("a", "A", asked.world, asked.parts, asked.scenarios[:1], asked.criteria[:1])
-    (seed,) = (trial.seed for trial in asked.trials(Secret(SECRET)))
+    assignment = find_assignment("echo-responder")
+    assignment = type(assignment)(
+        "a", "A", assignment.world, assignment.parts, assignment.scenarios[:1], assignment.criteria[:1]
+    )
+    (seed,) = (trial.seed for trial in assignment.trials(Secret(SECRET)))
     search = SEARCH.format(database=tmp_path / "robomark.db", codes=scrambled(SECRET, str(seed)))
     program = SourceFile("robot.py", f"{search}\nprint('PY::', told())\n")
     responder = SourceFile("responder.py", f"{search}\ndef responder(text): return str(told())\n")
     with TrialRunner() as runner:
-        (trial,) = grade(Submission("s", program, responder), asked, secret=Secret(SECRET), runner=runner).trials
+        (trial,) = grade(Submission("s", program, responder), assignment, secret=Secret(SECRET), runner=runner).trials
     assert [message.text for message in trial.recording.messages] == ["PY:: []", "[]"]
     # The search finds an existing secret.
     kept = {"it": SECRET}
-    here: dict[str, Any] = {}
-    exec(search, here)
-    assert 0 in here["told"](), kept
+    namespace: dict[str, Any] = {}
+    exec(search, namespace)
+    assert 0 in namespace["told"](), kept
 
 
 def _seeds(home: Path, **environment: Any) -> list[int]:
@@ -188,26 +190,26 @@ def test_only_its_hash_is_told(tmp_path: Path) -> None:
             "batch", "submit", batch, "-a", "echo-responder", "--wait", "--output", tmp_path / "out", **environment
         )
     ]
-    found = re.search(r"^ada .* (\w+) *$", done[0].stdout, re.MULTILINE)
-    assert found is not None, done[0]
-    for words in (("doctor",), ("verify", found[1]), ("show", found[1]), ("batch", "list"), ("db", "upgrade")):
+    match = re.search(r"^ada .* (\w+) *$", done[0].stdout, re.MULTILINE)
+    assert match is not None, done[0]
+    for words in (("doctor",), ("verify", match[1]), ("show", match[1]), ("batch", "list"), ("db", "upgrade")):
         done.append(robomark(*words, **environment))
         assert done[-1].returncode == 0, done[-1]
-    told = "".join(each.stdout + each.stderr for each in done)
+    output = "".join(each.stdout + each.stderr for each in done)
     name = Secret(SECRET).name
-    assert f"the secret in ROBOMARK_SECRET, hash {name}" in told
-    assert f"secret: {name}" in told
-    assert SECRET not in told
+    assert f"the secret in ROBOMARK_SECRET, hash {name}" in output
+    assert f"secret: {name}" in output
+    assert SECRET not in output
     files = [path for folder in (home, tmp_path / "out") for path in folder.rglob("*") if path.is_file()]
     assert any(path.suffix == ".log" for path in files)
     assert not any(SECRET.encode() in path.read_bytes() for path in files)
     own = load_home_secret(Settings(home=home)).text
-    assert own not in told
+    assert own not in output
     assert [path.name for path in files if own.encode() in path.read_bytes()] == ["robomark.db"]
 
     # With another secret the worlds are different, and the message says so.
     environment.pop("ROBOMARK_SECRET")
-    other = robomark("verify", found[1], **environment)
+    other = robomark("verify", match[1], **environment)
     assert other.returncode == 3
     assert f"cannot be verified with this secret: it was graded with {name}" in other.stderr
     assert "set ROBOMARK_SECRET to the original secret" in other.stderr
@@ -230,12 +232,12 @@ def test_grades_of_before_are_verified_in_the_worlds_of_then(tmp_path: Path) -> 
     shutil.copytree(locate_examples("dead-reckoning-with-noise") / "reference", batch / "ada")
     environment: dict[str, Any] = {"ROBOMARK_HOME": str(home)}
     done = robomark("batch", "submit", batch, "-a", "dead-reckoning-with-noise", "--wait", **environment)
-    found = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)
-    assert found is not None, done
-    assert robomark("verify", found[1], **environment).returncode == 0
+    match = re.search(r"^ada .* (\w+) *$", done.stdout, re.MULTILINE)
+    assert match is not None, done
+    assert robomark("verify", match[1], **environment).returncode == 0
     with open_store(Settings(home=home)) as store, store.transaction() as session:
         session.execute(update(Job).values(secret_sha256=None))
-    then = robomark("verify", found[1], **environment)
+    then = robomark("verify", match[1], **environment)
     assert "graded before this installation had a secret" in then.stderr
     # This grade has no recorded secret: its worlds differ from today's.
     assert then.returncode == 3

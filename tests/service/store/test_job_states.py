@@ -226,10 +226,10 @@ _WITH_STATES = ("store/queue/jobs.py", "store/queue/test_runs.py")
 def test_nothing_else_writes_the_state_of_a_job() -> None:
     folder = Path(service.__file__ or "").parent
     assert "Job" not in _imported((folder / _WITH_STATES[1]).read_text(encoding="utf-8"))
-    found = {
+    writers = {
         f"{path.relative_to(folder)}:{line}"
         for path in sorted(folder.rglob("*.py"))
         if path.relative_to(folder).as_posix() not in _WITH_STATES and "versions" not in path.parts
         for line in _job_writes(ast.parse(path.read_text(encoding="utf-8")))
     }
-    assert found == set()
+    assert writers == set()

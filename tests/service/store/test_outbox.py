@@ -39,7 +39,7 @@ def hook(store: Store, *events: str) -> str:
         return webhooks.create_webhook(session, 1, "https://hooks.example.org/x", events or EVENTS)[0].id
 
 
-def told(store: Store) -> list[tuple[str, dict[str, Any]]]:
+def list_deliveries(store: Store) -> list[tuple[str, dict[str, Any]]]:
     with store.reading() as session:
         rows = session.scalars(select(Delivery).order_by(Delivery.made_at, Delivery.event.desc())).all()
         return [(row.event, row.payload["data"]) for row in rows]
@@ -53,22 +53,22 @@ def grade_next(store: Store) -> str:
 
 
 def submit(store: Store, *students: str) -> str:
-    asked = [grading_request(each) for each in students]
-    return intake.accept_batch(store, "batch", asked, (), course="default", max_attempts=1).id
+    requests = [grading_request(each) for each in students]
+    return intake.accept_batch(store, "batch", requests, (), course="default", max_attempts=1).id
 
 
 def test_a_batch_is_told_of_job_by_job_and_once_when_it_is_finished(store: Store) -> None:
     hook(store)
     batch = submit(store, "ada", "bob")
     first, second = grade_next(store), grade_next(store)
-    assert [(event, data.get("job")) for event, data in told(store)] == [
+    assert [(event, data.get("job")) for event, data in list_deliveries(store)] == [
         ("grade.finished", first),
         ("grade.finished", second),
         ("batch.finished", None),
     ]
-    assert told(store)[-1][1] == {"batch": batch, "states": {"done": 2}}
+    assert list_deliveries(store)[-1][1] == {"batch": batch, "states": {"done": 2}}
     acting.publish(store, batch, actor="grace")
-    assert told(store)[-1] == ("grades.published", {"batch": batch, "published": 2})
+    assert list_deliveries(store)[-1] == ("grades.published", {"batch": batch, "published": 2})
 
 
 def test_nobody_is_named(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,7 +77,7 @@ def test_nobody_is_named(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     hook(store)
     submit(store, "ada")
     grade_next(store)
-    assert not is_named("ada", str(told(store)))
+    assert not is_named("ada", str(list_deliveries(store)))
 
 
 def test_what_ends_without_a_grade_ends_its_batch_too(store: Store) -> None:
@@ -90,7 +90,7 @@ def test_what_ends_without_a_grade_ends_its_batch_too(store: Store) -> None:
     acting.cancel(store, cancelled)
     superseded = submit(store, "carol")
     accept_one(store, "carol")
-    assert [(data["batch"], data["states"]) for _, data in told(store)] == [
+    assert [(data["batch"], data["states"]) for _, data in list_deliveries(store)] == [
         (batch, {"dead": 1}),
         (cancelled, {"cancelled": 1}),
         (superseded, {"cancelled": 1}),
@@ -103,7 +103,7 @@ def test_without_webhooks_nothing_is_written(store: Store) -> None:
         assert webhooks.revoke_webhook(session, 1, revoked)
     submit(store, "ada")
     grade_next(store)
-    assert told(store) == []
+    assert list_deliveries(store) == []
 
 
 def test_only_one_sender_has_a_delivery(store: Store) -> None:
@@ -177,8 +177,8 @@ def test_of_two_workers_that_end_a_batch_at_once_one_says_so(store: Store) -> No
         claims = [jobs.claim_job(store, "worker", 60) for _ in range(2)]
         with ThreadPoolExecutor(2) as pool:
             list(pool.map(lambda claim: jobs.give_up_job(store, claim, "the disk is full"), claims))
-        assert told(store)[-1] == ("batch.finished", {"batch": batch, "states": {"dead": 2}})
-    assert len(told(store)) == 5
+        assert list_deliveries(store)[-1] == ("batch.finished", {"batch": batch, "states": {"dead": 2}})
+    assert len(list_deliveries(store)) == 5
 
 
 def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
@@ -193,18 +193,18 @@ def test_of_two_requests_with_a_key_one_holds_it(store: Store) -> None:
             reach=Reach(scopes=frozenset({"read"})),
         )
         (token,) = credentials.list_credentials(session, person_id)
-    asked = (service_on(store), Actor("grace", person_id, credential_id=token.id), "k")
+    key_arguments = (service_on(store), Actor("grace", person_id, credential_id=token.id), "k")
 
     def begin(_: int) -> str:
         try:
-            return "holds it" if replies.reserve_key(*asked) is None else "answered"
+            return "holds it" if replies.reserve_key(*key_arguments) is None else "answered"
         except replies.InProgress:
             return "waits"
 
     with ThreadPoolExecutor(4) as pool:
         assert sorted(pool.map(begin, range(4))) == ["holds it", "waits", "waits", "waits"]
-    replies.store_reply(*asked, replies.StoredReply("a" * 64, 201, b"{}"))
-    assert replies.reserve_key(*asked) == replies.StoredReply("a" * 64, 201, b"{}")
+    replies.store_reply(*key_arguments, replies.StoredReply("a" * 64, 201, b"{}"))
+    assert replies.reserve_key(*key_arguments) == replies.StoredReply("a" * 64, 201, b"{}")
 
 
 def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:

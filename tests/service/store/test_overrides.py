@@ -90,7 +90,7 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
     rows = build_rows(store, [line])
     wide, *_ = _csv(FORMATS["csv"].table, rows)
     long = _csv(FORMATS["csv-long"].table, rows)
-    (told,) = json.loads(_written(FORMATS["json"].table, rows))
+    (document,) = json.loads(_written(FORMATS["json"].table, rows))
     properties = {
         each.get("name"): each.get("value") or ""
         for each in ElementTree.fromstring(_written(FORMATS["junit"].table, rows)).iter("property")
@@ -105,7 +105,7 @@ def _totals(store: Store, batch: str) -> dict[str, tuple[float, float]]:
         "grade": (float(grade.marks), float(grade.max_marks)),
         "csv": (float(wide["marks"]), float(wide["max_marks"])),
         "csv-long": (sum(float(row["marks"] or 0) for row in long), sum(float(row["max_marks"] or 0) for row in long)),
-        "json": (told["marks"], told["max_marks"]),
+        "json": (document["marks"], document["max_marks"]),
         "junit": (float(properties["marks"]), float(properties["max_marks"])),
         "report": (float(score[1]), float(score[2])),
     }
@@ -205,9 +205,11 @@ def test_a_copy_of_a_grade_has_the_graders_marks_and_not_what_was_set_for_anothe
     assert jobs.finish_job_from_cache(store, claim)
     copied = accept_submission(store, theirs[2], max_attempts=3)
     with store.reading() as session:
-        told = {job: job_lines.load_job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)}
+        marks = {
+            job: job_lines.load_job_line(session, job).marks for job in (first.job_id, waits.job_id, copied.job_id)
+        }
         assert job_lines.load_job_line(session, copied.job_id).copied_from == first.job_id
-    assert list(told.values()) == [2, 7, 7]
+    assert list(marks.values()) == [2, 7, 7]
     # An override of a submission also applies to a copied grade.
     _change(store, copied.job_id, _excuse(SHAPE))
     with store.reading() as session:
@@ -224,9 +226,9 @@ def test_what_could_not_be_judged_gets_its_marks_and_is_published(store: Store) 
     assert set(_totals(store, batch).values()) == {(7, 8)}
     with store.reading() as session:
         (line,) = job_lines.load_job_lines(session, batch)
-        told = build_staff_view(results.load_grade(session, job_id)).grade.criteria[0]
+        view = build_staff_view(results.load_grade(session, job_id)).grade.criteria[0]
     assert (line.unjudged, line.set_by_hand) == (0, 1)
-    assert told.message == "Adjusted by staff to 5: seen again."
+    assert view.message == "Adjusted by staff to 5: seen again."
     assert acting.publish(store, batch, actor="staff").published == 1
     _change(store, job_id, _withdraw(SHAPE))
     with store.reading() as session:
@@ -291,11 +293,11 @@ def test_the_trail_says_who_changed_what_and_keeps_no_reason(store: Store) -> No
     _change(store, job_id, lambda session, job: comments.add_comment(session, job, SHAPE, "Look at line 3.", "staff"))
     with store.reading() as session:
         subject = session.get_one(Job, job_id).submission_id
-        told = [
+        entries = [
             (step.action, step.before, step.after, step.text) for step in marking_history.load_history(session, subject)
         ]
         kept = audit.load_entries(session, "submission", str(subject))
-    assert told == [
+    assert entries == [
         ("set marks", "5", "5.5", "seen again"),
         ("excuse", "5.5", "excused", "was ill"),
         ("withdraw", "excused", "as graded", "was ill"),
@@ -313,12 +315,12 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
     with store.reading() as session:
         grade = results.load_grade(session, job_id)
         line = job_lines.load_job_line(session, job_id)
-    told = build_json_document(build_staff_view(grade))
-    first, second = told["criteria"]
+    json_document = build_json_document(build_staff_view(grade))
+    first, second = json_document["criteria"]
     assert first["message"].startswith("Adjusted by staff from 5 to 6: seen again. 5 of 6 images")
     assert first["set_by_hand"] == {"from": 5, "of": 6, "excused": False, "reason": "seen again"}
     assert second["message"].startswith("Excused, does not count (before: 2 of 2): was ill. It asked")
-    assert told["comments"] == [
+    assert json_document["comments"] == [
         {"criterion": "", "text": "Well <b>done</b>."}, {"criterion": SHAPE, "text": "Line 3 was right."},
     ]  # fmt: skip
     body = str(render_report_body(store, line.id, line.plots, build_student_view(grade)).body)
@@ -340,11 +342,11 @@ def test_a_report_says_what_was_set_why_and_what_was_written(store: Store) -> No
 def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> None:
     shape = GRADE.criteria[0]
     by_hand = StaffAdjustment(Decimal(5), Decimal(6), "seen again", excused=False)
-    said = replace(shape, set_by_hand=by_hand, marks=Decimal(6))
+    adjusted_result = replace(shape, set_by_hand=by_hand, marks=Decimal(6))
     trials = tuple(replace(trial, visibility="hidden") for trial in GRADE.trials)
-    told = build_student_view(replace(GRADE, criteria=(said,), trials=trials)).grade.criteria[0].message
-    assert told.startswith("Adjusted by staff from 5 to 6: seen again.")
-    assert "5 of 6 images" not in told
+    view = build_student_view(replace(GRADE, criteria=(adjusted_result,), trials=trials)).grade.criteria[0].message
+    assert view.startswith("Adjusted by staff from 5 to 6: seen again.")
+    assert "5 of 6 images" not in view
 
 
 def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
@@ -357,16 +359,16 @@ def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
     _change(store, bob, _excuse(SHAPE), _excuse(ALOUD))
     with store.reading() as session:
         lines = batch_table.load_table_lines(session, batch.id, (), HiddenNames(frozenset(), b""))
-        (found,) = class_overview.compute_overviews(session, 1, lines, Decimal("0.6"), NO_HIDDEN_NAMES)
+        (overviews,) = class_overview.compute_overviews(session, 1, lines, Decimal("0.6"), NO_HIDDEN_NAMES)
         accuracies = {line.student: line.accuracy for line in job_lines.load_job_lines(session, batch.id)}
     # Ada has 3 of 6, so 4 of 8; Cid 7 of 8.
-    statistics = found.statistics
+    statistics = overviews.statistics
     assert (statistics.n, statistics.mean, statistics.max_marks) == (2, 5.5, 8)
     assert (statistics.lowest, statistics.highest) == (4, 7)
-    assert {bin_.low: bin_.count for bin_ in found.distribution if bin_.count} == {4: 1, 7: 1}
-    assert found.passed == 1
+    assert {bin_.low: bin_.count for bin_ in overviews.distribution if bin_.count} == {4: 1, 7: 1}
+    assert overviews.passed == 1
     assert {each.id: each.n for each in statistics.criteria} == {SHAPE: 2, ALOUD: 1}
-    assert bob not in {each.id for each in found.outliers}
+    assert bob not in {each.id for each in overviews.outliers}
     assert {student: accuracy is None for student, accuracy in accuracies.items()} == {
         "ada": False,
         "bob": True,

@@ -34,12 +34,12 @@ def test_places_are_told_as_jobs_are_claimed(store: Store) -> None:
     batch = accept_batch(store, "class", [grading_request("dan"), grading_request("eve")], (), max_attempts=3)
     waiting = [*ids, *(job.job_id for job in batch.jobs)]
     assert sorted(_place(store, job_id).before for job_id in waiting) == [0, 1, 2, 3, 4]
-    told = sorted(waiting, key=lambda job_id: _place(store, job_id).before)
-    assert told[:3] == ids
+    ordered_ids = sorted(waiting, key=lambda job_id: _place(store, job_id).before)
+    assert ordered_ids[:3] == ids
     claimed = jobs.claim_job(store, "worker", 60)
     assert claimed is not None
-    assert claimed.job_id == told[0]
-    assert _place(store, told[1]).before == 0
+    assert claimed.job_id == ordered_ids[0]
+    assert _place(store, ordered_ids[1]).before == 0
     # A student who was just served waits for the others.
     again = _another(store, "ada", "print('again')\n")
     assert _place(store, again).before == 2

@@ -143,8 +143,8 @@ def test_a_backup_of_a_newer_release_is_refused_and_leaves_nothing(tmp_path: Pat
 
 def _counts(store: Store) -> dict[str, int]:
     with store.reading() as session:
-        found = {kind: session.scalar(select(func.count()).select_from(kind)) or 0 for kind in _COUNTED}
-    return {kind.__tablename__: count for kind, count in found.items()}
+        counts = {kind: session.scalar(select(func.count()).select_from(kind)) or 0 for kind in _COUNTED}
+    return {kind.__tablename__: count for kind, count in counts.items()}
 
 
 _COUNTED = (Batch, SubmissionRow, Job, TrialRow, Artifact, Enrolment, Person, Override, Comment, Appeal)

@@ -77,14 +77,14 @@ def test_lines_in_pages_miss_and_double_nothing_and_their_order_tells_no_hidden_
         open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.hide_names(session, 1, echo().id, hidden)
     names = load_hidden_names(store, 1)
-    found: list[JobLine] = []
+    lines: list[JobLine] = []
     with store.reading() as session:
-        while page := job_lines.load_job_lines_page(session, batch_id, names, 3, found[-1].id if found else None):
-            found += page
-    assert len({line.id for line in found}) == len(found) == 8
-    ordered = [line.id if hidden else line.student for line in found]
+        while page := job_lines.load_job_lines_page(session, batch_id, names, 3, lines[-1].id if lines else None):
+            lines += page
+    assert len({line.id for line in lines}) == len(lines) == 8
+    ordered = [line.id if hidden else line.student for line in lines]
     assert ordered == sorted(ordered)
-    assert all(line.student.startswith("Participant ") == hidden for line in found)
+    assert all(line.student.startswith("Participant ") == hidden for line in lines)
 
 
 def test_the_same_batch_again_changes_nothing(store: Store) -> None:

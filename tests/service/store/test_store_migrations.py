@@ -66,7 +66,7 @@ def _lines_of(statement: str) -> list[str]:
 
 
 def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
-    told = []
+    differences = []
     for name, lay in (
         ("laid", partial(new_database.create_tables, revision=find_newest_revision())),
         ("migrated", apply_migrations),
@@ -78,10 +78,12 @@ def test_a_new_database_is_what_the_migrations_make(tmp_path: Path) -> None:
             schema = [_lines_of(statement) for statement in read_statements(connection)]
             rows = {table.name: connection.execute(select(table)).mappings().all() for table in METADATA.sorted_tables}
             (installation,) = rows.pop("installation")
-            told.append((schema, rows, len(installation["secret"]), read_revision(connection)))
+            differences.append((schema, rows, len(installation["secret"]), read_revision(connection)))
             assert not new_database.is_empty_sqlite(connection)
         engine.dispose()
-    assert told[0] == told[1], "python -m service.store.recorded_schema writes down anew what the migrations make"
+    assert differences[0] == differences[1], (
+        "python -m service.store.recorded_schema writes down anew what the migrations make"
+    )
 
 
 def test_many_may_come_first(service_settings: Settings) -> None:
@@ -185,8 +187,10 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
         with store.engine.begin() as connection:
             command.check(build_alembic_config(connection))
         with store.reading() as session:
-            found = session.execute(select(Job.state, Job.standing, func.count()).group_by(Job.state, Job.standing))
-            assert {(state, standing): count for state, standing, count in found} == {
+            state_counts = session.execute(
+                select(Job.state, Job.standing, func.count()).group_by(Job.state, Job.standing)
+            )
+            assert {(state, standing): count for state, standing, count in state_counts} == {
                 (JobState.DONE, Standing.STANDS): 2,
                 (JobState.DONE, Standing.PROPOSED): 1,
                 (JobState.DEAD, Standing.STANDS): 1,
@@ -349,9 +353,11 @@ def test_names_go_to_enrolments_and_credentials_get_their_reach(service_settings
         assert {(who, name, email) for who, name, email in rows if who >= 50} == {
             (person, f"Name {person}", "") for person in range(50, 55)
         }
-        found = session.execute(select(Credential.person_id, Credential.course_id, Credential.role)).all()
+        credential_rows = session.execute(select(Credential.person_id, Credential.course_id, Credential.role)).all()
         limited = {50: (1, Role.STUDENT), 54: (1, Role.STUDENT)}
-        assert {tuple(row) for row in found} == {(who, *limited.get(who, (None, None))) for who in range(50, 55)}
+        assert {tuple(row) for row in credential_rows} == {
+            (who, *limited.get(who, (None, None))) for who in range(50, 55)
+        }
         signed_in = session.scalars(select(Person.id).where(Person.signed_in_at.is_not(None))).all()
         assert sorted(signed_in) == [50, 51, 52, 53]
         launched = session.execute(select(LtiCourse.platform_id, LtiCourse.deployment)).all()

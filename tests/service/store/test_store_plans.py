@@ -43,10 +43,10 @@ def test_batches_are_counted_without_reading_their_jobs(sqlite: Store) -> None:
 
 
 def _plans(store: Store, ask: Callable[[Session], object]) -> list[str]:
-    asked: list[tuple[str, tuple[object, ...]]] = []
+    statements: list[tuple[str, tuple[object, ...]]] = []
 
     def note(_connection: object, _cursor: object, statement: str, parameters: tuple[object, ...], *_: object) -> None:
-        asked.append((statement, parameters))
+        statements.append((statement, parameters))
 
     event.listen(store.engine, "before_cursor_execute", note)
     with store.reading() as session:
@@ -55,6 +55,6 @@ def _plans(store: Store, ask: Callable[[Session], object]) -> list[str]:
     with store.engine.connect() as connection:
         return [
             str(row[-1])
-            for statement, parameters in asked
+            for statement, parameters in statements
             for row in connection.exec_driver_sql("EXPLAIN QUERY PLAN " + statement, parameters)
         ]

@@ -215,7 +215,7 @@ def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> 
 
 
 @pytest.mark.parametrize(
-    ("asked", "found"),
+    ("condition", "expected_ids"),
     [
         (Job.marks == Decimal("8"), {"8", "8.0"}),
         (Job.marks != Decimal("8.00"), {"9", "10"}),
@@ -225,14 +225,16 @@ def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> 
         (Job.marks.in_([Decimal("8.0"), Decimal("10.0")]), {"8", "8.0", "10"}),
     ],
 )
-def test_every_query_compares_marks_as_numbers(store: Store, asked: ColumnElement[bool], found: set[str]) -> None:
+def test_every_query_compares_marks_as_numbers(
+    store: Store, condition: ColumnElement[bool], expected_ids: set[str]
+) -> None:
     marks = ("8", "8.0", "9", "10")
     _batch(store, *(f"student-{number}" for number, _ in enumerate(marks)))
     with store.transaction() as session:
         for job, own in zip(session.scalars(select(Job).order_by(Job.id)), marks, strict=True):
             job.marks = Decimal(own)
     with store.reading() as session:
-        assert {str(job.marks) for job in session.scalars(select(Job).where(asked))} == found
+        assert {str(job.marks) for job in session.scalars(select(Job).where(condition))} == expected_ids
 
 
 def test_criteria_that_come_and_go_are_told(store: Store) -> None:
@@ -241,8 +243,8 @@ def test_criteria_that_come_and_go_are_told(store: Store) -> None:
     (first, *rest) = GRADE.criteria
     other = replace(GRADE, criteria=(replace(first, id="new", title="A new one", marks=Decimal(1)), *rest))
     (change,) = _changes(store, _regrade(store, batch, other, changed=True))
-    told = {criterion.title: (criterion.before is None, criterion.after is None) for criterion in change.criteria}
-    assert told == {"A new one": (True, False), first.title: (False, True)}
+    is_missing = {criterion.title: (criterion.before is None, criterion.after is None) for criterion in change.criteria}
+    assert is_missing == {"A new one": (True, False), first.title: (False, True)}
 
 
 def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> None:

@@ -91,8 +91,8 @@ def test_the_times_of_a_grade_are_kept_and_told(store: Store) -> None:
     plots.store_plots(store, job_id, {})
     job = _job(store, job_id)
     assert (job.state, set(job.phases)) == (JobState.DONE, set(phases.NAMES))
-    told = phases.compute_durations(job.phases)
-    assert (told["trials"], told["judging"]) == (timedelta(seconds=2), timedelta(seconds=1))
+    durations = phases.compute_durations(job.phases)
+    assert (durations["trials"], durations["judging"]) == (timedelta(seconds=2), timedelta(seconds=1))
     with store.reading() as session:
         assert metrics.collect_service_metrics(session).times["trials"] == [2.0]
 

@@ -47,9 +47,9 @@ KNOWN = ("ada-known-as", "Lovelace", "ada@example.org")
 
 
 def submit(store: Store, *students: Student, refused: str = "") -> None:
-    asked = [replace(grading_request(each.id), listed_student=each, source=f"{each.id}.zip") for each in students]
+    requests = [replace(grading_request(each.id), listed_student=each, source=f"{each.id}.zip") for each in students]
     refusals = (RejectedSubmission("x.zip", "is empty", Student(refused)),) if refused else ()
-    intake.accept_batch(store, "batch", asked, refusals, course="default", max_attempts=3)
+    intake.accept_batch(store, "batch", requests, refusals, course="default", max_attempts=3)
     while claim := jobs.claim_job(store, "worker", 60):
         jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), NOW)
 
@@ -228,8 +228,8 @@ def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
     assert document["submissions"][0]["appeals"][0]["text"] == f"I am {KNOWN[1]}"
     assert document["extensions"][0]["more_attempts"] == 1
     assert "secret" not in json.dumps(document)
-    shown = {each.id for each in report_builders.faulty_grade().criteria if each.visibility == "visible"}
-    assert {each["id"] for each in grade["criteria"]} == shown
+    visible_ids = {each.id for each in report_builders.faulty_grade().criteria if each.visibility == "visible"}
+    assert {each["id"] for each in grade["criteria"]} == visible_ids
 
 
 def _in_another_course(session: Session, person_id: int) -> None:

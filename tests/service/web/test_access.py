@@ -83,23 +83,23 @@ def test_every_route_is_in_a_table(signed: tuple[Web, Signed]) -> None:
 def test_programs_can_do_all_that_pages_do() -> None:
     served = {"/static/{name}", "/health/live", "/health/ready", "/metrics", "/api/openapi.json"}
     pages = {route for route in ROUTES if API not in route and route.partition(" ")[2] not in served}
-    told = tomllib.loads((DATA / "page_to_api.toml").read_text())
-    assert pages == set(told)
+    document = tomllib.loads((DATA / "page_to_api.toml").read_text())
+    assert pages == set(document)
     does = {route.replace(API, "/", 1) for route in ROUTES if API in route}
-    assert {each for each in told.values() if not each.startswith("none: ")} <= does
+    assert {each for each in document.values() if not each.startswith("none: ")} <= does
 
 
 @pytest.mark.parametrize("route", sorted(ROUTES))
 def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
-    web, asked = signed
+    web, signed_requests = signed
     method, path = route.split(" ", 1)
     allowed = ALLOWED[ROUTES[route].split(" ")[0]]
-    values = asked.values
+    values = signed_requests.values
     if "{upload_id}" in path:  # the deletion of a student removes the waiting uploads of the course
         values = {**values, "upload_id": create_upload(web, web.instructor())}
     # Readers without permission first: the others could end the objects.
     for who in sorted(READERS, key=lambda each: each in allowed):
-        answer = _ask(asked, who, method, filled(path, values))
+        answer = _ask(signed_requests, who, method, filled(path, values))
         if who in allowed:
             assert answer.status_code not in (401, 404, 403, 500), (who, answer.status_code, answer.text[-2000:])
             assert not (answer.status_code == 303 and answer.headers["location"].startswith("/sign-in?")), who
@@ -114,13 +114,13 @@ def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
 
 @pytest.mark.parametrize("route", sorted(route for route in ROUTES if API in route and " " in ROUTES[route]))
 def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: str) -> None:
-    web, asked = signed
+    web, signed_requests = signed
     method, path = route.split(" ", 1)
     who, scope = ROUTES[route].split(" ")
     reader = {"signed-in": "owner", "student": "owner"}.get(who, who)
     members = {"owner": web.student("ada"), "instructor": web.instructor(), "operator": web.operator()}
     token = web.token(members[reader], *({"read", "submit", "mark", "manage"} - {scope}))
-    answer = asked.browsers["nobody"].request(method, filled(path, asked.values), headers=token)
+    answer = signed_requests.browsers["nobody"].request(method, filled(path, signed_requests.values), headers=token)
     assert answer.status_code == 403, answer.text
     assert scope in answer.json()["detail"]
 
@@ -128,23 +128,27 @@ def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: st
 @pytest.mark.parametrize("route", sorted(_CHANGING))
 def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signed], route: str) -> None:
     method, path = route.split(" ", 1)
-    _, asked = signed
-    for who in asked.words:
-        answer = asked.browsers[who].request(method, filled(path, asked.values), data={"csrf": "0" * 64})
+    _, signed_requests = signed
+    for who in signed_requests.words:
+        answer = signed_requests.browsers[who].request(
+            method, filled(path, signed_requests.values), data={"csrf": "0" * 64}
+        )
         if path.startswith(API):
             # The API ignores cookies, so no other site can use them.
             assert answer.status_code == 401
             continue
         assert answer.status_code in (403, 404), (who, answer.status_code)
-        other = {"sec-fetch-site": "cross-site", "x-csrf-token": asked.words[who]}
-        assert asked.browsers[who].request(method, filled(path, asked.values), headers=other).status_code in (403, 404)
+        other = {"sec-fetch-site": "cross-site", "x-csrf-token": signed_requests.words[who]}
+        assert signed_requests.browsers[who].request(
+            method, filled(path, signed_requests.values), headers=other
+        ).status_code in (403, 404)
 
 
-def _ask(asked: Signed, who: str, method: str, path: str) -> Response:
+def _ask(signed_requests: Signed, who: str, method: str, path: str) -> Response:
     if path.startswith(API):
-        return asked.browsers["nobody"].request(method, path, headers=asked.tokens.get(who, {}))
+        return signed_requests.browsers["nobody"].request(method, path, headers=signed_requests.tokens.get(who, {}))
     # These routes end sessions and tokens that later tests need.
     if path in ("/sign-out", "/account/end-others") and who != "nobody":
-        return asked.browsers[who].get("/account")
-    headers = {"x-csrf-token": asked.words[who]} if who in asked.words else {}
-    return asked.browsers[who].request(method, path, headers=headers)
+        return signed_requests.browsers[who].get("/account")
+    headers = {"x-csrf-token": signed_requests.words[who]} if who in signed_requests.words else {}
+    return signed_requests.browsers[who].request(method, path, headers=headers)

@@ -69,9 +69,12 @@ def zipped(**students: str) -> bytes:
 
 
 def upload(program: Program, data: bytes, name: str = "week", **headers: str) -> Response:
-    told = {"content-type": "application/zip", **{key.replace("_", "-"): value for key, value in headers.items()}}
+    sent_headers = {
+        "content-type": "application/zip",
+        **{key.replace("_", "-"): value for key, value in headers.items()},
+    }
     path = f"/batches?name={name}&assignment=echo-responder"
-    return program.ask("POST", path, told, content=data)
+    return program.ask("POST", path, sent_headers, content=data)
 
 
 def graded(web: Web) -> str:
@@ -139,20 +142,20 @@ def test_of_two_requests_at_once_the_second_is_told_to_wait(web: Web, grace: Pro
 
 
 def test_lists_come_in_pages_that_miss_and_double_nothing(web: Web, grace: Program) -> None:
-    asked = [grading_request(f"s{number}", f"print({number})\n") for number in range(5)]
+    requests = [grading_request(f"s{number}", f"print({number})\n") for number in range(5)]
     for number in range(5):
-        intake.accept_batch(web.store, f"b{number}", asked, (), course=COURSE, max_attempts=1)
+        intake.accept_batch(web.store, f"b{number}", requests, (), course=COURSE, max_attempts=1)
     (batch, *_) = grace.ask("GET", "/batches?limit=1").json()["items"]
     for path, key in (("/batches", "id"), ("/people", "enrolment"), (f"/batches/{batch['id']}/grades", "id")):
         whole = [each[key] for each in grace.ask("GET", f"{path}?limit=200").json()["items"]]
         assert len(whole) >= 5
-        found, after = [], ""
+        items, after = [], ""
         while after is not None:
             page = grace.ask("GET", path, params={"limit": 2, "after": after}).json()
             assert len(page["items"]) <= 2
-            found += [each[key] for each in page["items"]]
+            items += [each[key] for each in page["items"]]
             after = page["next"]
-        assert found == whole
+        assert items == whole
     for nonsense in ("x", "bnVsbA", "WzFd", "W10", "ä"):
         answer = grace.ask("GET", "/batches", params={"after": nonsense})
         assert answer.status_code == 422, nonsense
@@ -222,12 +225,12 @@ def test_where_names_are_hidden_nobody_is_named(web: Web, grace: Program) -> Non
         open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
         open_assignments.hide_names(session, 1, "echo-responder", True)
     batch = grace.ask("GET", "/batches").json()["items"][0]["id"]
-    shown = [grace.ask("GET", path).text for path in (f"/batches/{batch}/grades", f"/batches/{batch}")]
-    shown += [grace.ask("GET", f"/grades/{job}{part}").text for part in ("", "/state", "/report", "/replay")]
-    assert [text for text in shown if re.search(r"\bada\b", text, re.IGNORECASE)] == []
+    page_text = [grace.ask("GET", path).text for path in (f"/batches/{batch}/grades", f"/batches/{batch}")]
+    page_text += [grace.ask("GET", f"/grades/{job}{part}").text for part in ("", "/state", "/report", "/replay")]
+    assert [text for text in page_text if re.search(r"\bada\b", text, re.IGNORECASE)] == []
     called = load_hidden_names(web.store, 1).label_student("echo-responder", "ada")
     assert called.startswith("Participant ")
-    assert called in shown[0]
+    assert called in page_text[0]
     assert grace.ask("GET", "/submissions/1/files").status_code == 404
 
 
@@ -289,9 +292,9 @@ def test_a_token_made_on_the_page_is_one_and_stays_to_be_copied_until_it_is_used
     browser = web.browser(web.instructor())
     for _ in range(2):
         made = submit(browser, "/account/tokens", {"name": "script", "scopes": "read", "word": "once"})
-        shown = browser.get(made.headers["location"]).text
-        assert shown.count('<th scope="row">script</th>') == 1
-    (secret,) = set(re.findall(r"rmt_[\w-]+", shown))
+        page_text = browser.get(made.headers["location"]).text
+        assert page_text.count('<th scope="row">script</th>') == 1
+    (secret,) = set(re.findall(r"rmt_[\w-]+", page_text))
     others = web.browser(web.instructor("mallory")).get(made.headers["location"]).text
     assert "rmt_" not in others
     assert Program(web.browser(), {"authorization": f"Bearer {secret}"}).ask("GET", "/batches").status_code == 200

@@ -114,11 +114,11 @@ def test_nothing_that_programs_rely_on_has_changed() -> None:
 
 @pytest.mark.parametrize("name", BREAKING)
 def test_a_change_that_breaks_programs_is_found(name: str) -> None:
-    change, found = BREAKING[name]
+    change, expected_change = BREAKING[name]
     changed = copy.deepcopy(DESCRIPTION)
     change(changed)
     changes = breaking_changes(contract_of(DESCRIPTION), contract_of(changed))
-    assert f"POST {ROUTE} {found}" in changes, changes
+    assert f"POST {ROUTE} {expected_change}" in changes, changes
 
 
 @pytest.mark.parametrize("name", HARMLESS)

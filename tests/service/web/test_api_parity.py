@@ -53,9 +53,9 @@ def test_an_assignment_of_ones_own_is_checked_prepared_and_previewed(
     send = {"headers": {"content-type": "application/zip"}}
     made = programs.ask("grace", "POST", "/assignments/uploads", content=zipped(files), **send)
     assert (made.status_code, made.json()["open"]) == (201, False), made.text
-    shown = programs.ask("grace", "GET", f"/assignments/{made.json()['id']}").json()
-    assert [each["marks"] for each in shown["criteria"]]
-    assert shown["has_reference"] is False  # from the catalogue
+    document = programs.ask("grace", "GET", f"/assignments/{made.json()['id']}").json()
+    assert [each["marks"] for each in document["criteria"]]
+    assert document["has_reference"] is False  # from the catalogue
     broken = files | {"mine/assignment.toml": b"id = 7\n"}
     answer = programs.ask("grace", "POST", "/assignments/uploads", content=zipped(broken), **send)
     assert (answer.status_code, "assignment.toml" in answer.json()["detail"]) == (422, True)
@@ -67,11 +67,13 @@ def test_an_assignment_of_ones_own_is_checked_prepared_and_previewed(
 def test_a_program_is_tried_by_its_owner_alone(programs: Programs) -> None:
     files = [("files", (name, text.encode())) for name, text in ECHO.items()]
     path = "/mine/tryouts"
-    asked = programs.ask("ada", "POST", f"{path}?assignment=echo-responder", files=files)
-    assert (asked.status_code, asked.json()["state"], asked.json()["said"]) == (201, "queued", None), asked.text
+    response = programs.ask("ada", "POST", f"{path}?assignment=echo-responder", files=files)
+    assert (response.status_code, response.json()["state"], response.json()["said"]) == (201, "queued", None), (
+        response.text
+    )
     again = programs.ask("ada", "POST", f"{path}?assignment=echo-responder", files=files)
     assert (again.status_code, "not completed yet" in again.json()["detail"]) == (422, True)
-    own = f"{path}/{asked.json()['id']}"
+    own = f"{path}/{response.json()['id']}"
     assert programs.ask("ada", "GET", f"{own}/replay").status_code == 404
     claimed = test_runs.claim_test_run(programs.web.store, 60)
     assert claimed is not None
@@ -85,8 +87,8 @@ def test_a_program_is_tried_by_its_owner_alone(programs: Programs) -> None:
 
 def test_one_grade_is_published_and_graded_again(programs: Programs) -> None:
     job = programs.world.values["job_id"]
-    told = programs.ask("ada", "GET", "/mine/submissions/1").json()
-    assert (told["published"], told["job"], told["place"]) == (False, job, None)
+    document = programs.ask("ada", "GET", "/mine/submissions/1").json()
+    assert (document["published"], document["job"], document["place"]) == (False, job, None)
     assert programs.ask("grace", "POST", f"/grades/{job}/publish").json()["published"] == 1
     assert programs.ask("ada", "GET", "/mine/submissions/1").json()["published"] is True
     made = programs.ask("grace", "POST", f"/grades/{job}/regrades")
@@ -99,9 +101,9 @@ def test_a_batch_is_looked_at_before_and_after(programs: Programs) -> None:
     data = zipped({f"{who}/{name}": t.encode() for who in ("ada", "cyd") for name, t in ECHO.items()} | {"eve/x": b""})
     send = {"headers": {"content-type": "application/zip"}, "content": data}
     before = programs.ask("grace", "GET", "/batches").json()
-    found = programs.ask("grace", "POST", "/batches/preflight?assignment=echo-responder", **send).json()
-    assert {each["student"]: each["enrolled"] for each in found["submissions"]} == {"ada": True, "cyd": False}
-    assert [each["source"] for each in found["refusals"]] == ["eve"]
+    document = programs.ask("grace", "POST", "/batches/preflight?assignment=echo-responder", **send).json()
+    assert {each["student"]: each["enrolled"] for each in document["submissions"]} == {"ada": True, "cyd": False}
+    assert [each["source"] for each in document["refusals"]] == ["eve"]
     assert programs.ask("grace", "GET", "/batches").json() == before
     batch = f"/batches/{programs.world.values['batch_id']}"
     (seen,) = programs.ask("grace", "GET", f"{batch}/overview?pass=0").json()["classes"]
@@ -122,20 +124,23 @@ def test_one_student_with_grades_unless_names_are_hidden(programs: Programs) -> 
     path = f"/people/{programs.world.ada.enrolment_id}"
     assert [each["attempt"] for each in programs.ask("grace", "GET", path).json()["gradings"]] == [1]
     programs.ask("grace", "POST", "/assignments/echo-responder/names", json={"names_hidden": True})
-    told = programs.ask("grace", "GET", path).json()
-    assert (told["gradings"], told["some_hidden"]) == ([], True)
+    document = programs.ask("grace", "GET", path).json()
+    assert (document["gradings"], document["some_hidden"]) == ([], True)
 
 
 def test_platforms_are_registered_and_asked_for_members(programs: Programs) -> None:
     addresses = {f"{each}_url": f"https://moodle.example.org/{each}" for each in ("authorization", "token", "keys")}
-    asked = {
+    registration = {
         "name": "Moodle",
         "issuer": "https://moodle.example.org",
         "client_id": "x",
         "deployments": ["1"],
     } | addresses
-    assert programs.ask("root", "POST", "/api/v1/operator/platforms", json=asked).json()["items"][0]["name"] == "Moodle"
-    bad = asked | {"token_url": "file:///etc/passwd"}
+    assert (
+        programs.ask("root", "POST", "/api/v1/operator/platforms", json=registration).json()["items"][0]["name"]
+        == "Moodle"
+    )
+    bad = registration | {"token_url": "file:///etc/passwd"}
     assert programs.ask("root", "POST", "/api/v1/operator/platforms", json=bad).status_code == 422
     assert programs.ask("grace", "GET", "/platform").json() == {"name": None, "members": False, "marks": False}
     assert programs.ask("grace", "POST", "/platform/members").status_code == 422

@@ -41,7 +41,7 @@ def _as_it_is(_context: Any, value: Any) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[str, Any], dict[str, str]]]:
+def described_api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[str, Any], dict[str, str]]]:
     """Yield the application, the header of each kind of reader, and the path values."""
     with web_in(tmp_path_factory.mktemp("home"), api_calls_per_minute=1_000_000) as web:
         world = make_world(web)
@@ -55,13 +55,15 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[
 
 @pytest.mark.parametrize("who", ["instructor", "student", "operator"])
 @pytest.mark.parametrize("mode", list(GenerationMode))
-def test_every_answer_is_as_it_is_described(asked: tuple[Web, Any, Any], who: str, mode: GenerationMode) -> None:
-    web, tokens, values = asked
+def test_every_answer_is_as_it_is_described(
+    described_api: tuple[Web, Any, Any], who: str, mode: GenerationMode
+) -> None:
+    web, tokens, values = described_api
     schema = schemathesis.openapi.from_dict(web.app.openapi())
     schema.app = web.app
-    for found in schema.get_all_operations():
-        assert isinstance(found, Ok)
-        _try(found.ok(), mode, tokens[who], values)
+    for each in schema.get_all_operations():
+        assert isinstance(each, Ok)
+        _try(each.ok(), mode, tokens[who], values)
 
 
 def _try(operation: Any, mode: GenerationMode, token: dict[str, str], values: dict[str, str]) -> None:

@@ -40,18 +40,18 @@ def web_of_many(web: Web) -> Web:
 
 def test_the_pages_lead_to_every_appeal(web_of_many: Web) -> None:
     browser = web_of_many.browser(web_of_many.instructor())
-    for link, last, told in (("after", "Bob asks.", "open"), ("answered_after", "To Bob.", "done")):
+    for link, last, each in (("after", "Bob asks.", "open"), ("answered_after", "To Bob.", "done")):
         path, seen, pages = "/courses/1/appeals", list[str](), 0
         while True:
-            shown = browser.get(path)
-            assert shown.status_code == 200
-            seen += re.findall(rf"{told} (\d+)\.", words(shown.text))
+            response = browser.get(path)
+            assert response.status_code == 200
+            seen += re.findall(rf"{each} (\d+)\.", words(response.text))
             pages += 1
-            found = re.search(rf'href="(/courses/1/appeals\?{link}=[^"]+)"', shown.text)
-            if found is None:
+            match = re.search(rf'href="(/courses/1/appeals\?{link}=[^"]+)"', response.text)
+            if match is None:
                 break
-            path = found[1]
-        assert last in words(shown.text)
+            path = match[1]
+        assert last in words(response.text)
         assert sorted(map(int, seen)) == list(range(_MANY))
         assert pages == 3
 
@@ -59,15 +59,15 @@ def test_the_pages_lead_to_every_appeal(web_of_many: Web) -> None:
 @pytest.mark.parametrize("answered", ["false", "true"])
 def test_programs_are_led_to_every_appeal(web_of_many: Web, answered: str) -> None:
     token = web_of_many.token(web_of_many.instructor(), "read")
-    client, found, after = web_of_many.browser(), list[int](), ""
+    client, appeal_ids, after = web_of_many.browser(), list[int](), ""
     while True:
         path = f"/api/v1/courses/1/appeals?answered={answered}&limit=40&after={after}"
-        told = client.get(path, headers=token).json()
-        found += [each["id"] for each in told["items"]]
-        if told["next"] is None:
+        document = client.get(path, headers=token).json()
+        appeal_ids += [each["id"] for each in document["items"]]
+        if document["next"] is None:
             break
-        after = told["next"]
-    assert len(found) == len(set(found)) == _MANY + 1
+        after = document["next"]
+    assert len(appeal_ids) == len(set(appeal_ids)) == _MANY + 1
 
 
 @pytest.mark.parametrize("place", ["x", "2026-01-01", "2026-01-01 x", "9999-12-31T23:59:59-23:59 1", " "])

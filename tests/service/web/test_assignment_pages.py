@@ -32,16 +32,16 @@ def test_an_assignment_is_prepared_opened_and_closed(web: Web, grace: TestClient
             assert open_assignments.load_course_assignment(session, 1, "echo-responder").open is is_open
     policy = {"assignment": "echo-responder", "due": "2026-11-30T17:00", "late_days": "2", "attempts": "3"}
     submit(grace, f"{HOME}/policy", policy)
-    shown = grace.get(f"{path}/echo-responder").text
-    assert 'value="2026-11-30T17:00"' in shown
+    visible_text = grace.get(f"{path}/echo-responder").text
+    assert 'value="2026-11-30T17:00"' in visible_text
     with web.store.reading() as session:
         allowed = policies.load_policies(session, 1)["echo-responder"]
         done = [entry.action for entry in audit.load_entries(session, "course", "1")]
     assert (allowed.late_days, allowed.attempts) == (2, 3)
     submit(grace, f"{HOME}/policy", policy | {"due": "2020-11-30T17:00"})
-    told = words(grace.get(f"{path}/echo-responder?done=policy").text)
-    assert "Changes saved." in told
-    assert "Late submissions are no longer accepted" in told
+    page_text = words(grace.get(f"{path}/echo-responder?done=policy").text)
+    assert "Changes saved." in page_text
+    assert "Late submissions are no longer accepted" in page_text
     submit(grace, f"{path}/echo-responder/no-policy")
     assert "This assignment uses the default policy" in words(grace.get(f"{path}/echo-responder").text)
     assert done == ["prepare", "open", "close", "open", "policy"]
@@ -83,8 +83,8 @@ def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: Te
     answer = submit(grace, f"{HOME}/assignments/uploads", files=own)
     assert answer.status_code == 303, words(answer.text)
     grade_all(web, report_builders.faulty_grade())
-    shown = grace.get(answer.headers["location"]).text
-    preview = re.search(rf'href="({HOME}/grades/\w+)"', shown)
+    page_text = grace.get(answer.headers["location"]).text
+    preview = re.search(rf'href="({HOME}/grades/\w+)"', page_text)
     assert preview
     assert grace.get(preview[1]).status_code == 200
     with web.store.reading() as session:
@@ -129,17 +129,17 @@ def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_sa
 def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: TestClient) -> None:
     path = f"{HOME}/catalogue"
 
-    def found(query: str) -> list[str]:
+    def search(query: str) -> list[str]:
         return re.findall(r'name="assignment" value="([^"]+)"', grace.get(f"{path}?{query}").text)
 
-    assert sorted(found("")) == sorted(list_catalogue_ids())
-    assert found("q=LOLLIPOP+noise") == ["lollipop-with-noise"]
-    assert found("q=sensor&topic=05") == [each for each in found("topic=05") if each in found("q=sensor")]
-    assert "relay-a-message" in found("topic=none")
-    assert found("q=nothing+is+like+this") == []
+    assert sorted(search("")) == sorted(list_catalogue_ids())
+    assert search("q=LOLLIPOP+noise") == ["lollipop-with-noise"]
+    assert search("q=sensor&topic=05") == [each for each in search("topic=05") if each in search("q=sensor")]
+    assert "relay-a-message" in search("topic=none")
+    assert search("q=nothing+is+like+this") == []
     assert "<script" not in words(grace.get(f"{path}?q=%3Cscript%3E&topic=%22").text)
     submit(grace, f"{HOME}/assignments", {"assignment": "lollipop"})
-    assert "lollipop" not in found("q=lollipop")
+    assert "lollipop" not in search("q=lollipop")
     assert f'href="{HOME}/assignments/lollipop"' in grace.get(f"{path}?q=lollipop").text
 
 

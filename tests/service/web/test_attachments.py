@@ -27,9 +27,9 @@ def test_any_name_is_one_name(name: str) -> None:
 @pytest.mark.parametrize("character", ["x", "\u2603", "\U0001f916"])
 def test_a_long_name_is_shortened_and_keeps_its_ending(character: str) -> None:
     header = respond_with_attachment(b"", f"{character * 5000}.csv").headers["content-disposition"]
-    found = _HEADER.fullmatch(header)
-    assert found
-    assert all(name.endswith(".csv") for name in found.groups())
+    match = _HEADER.fullmatch(header)
+    assert match
+    assert all(name.endswith(".csv") for name in match.groups())
     assert len(header) < 2200
 
 

@@ -69,18 +69,18 @@ def test_a_batch_is_looked_at_before_it_is_taken_in(web: Web, grace: TestClient)
         for name, text in bad.items():
             archive.writestr(name, text)
     place = sent(grace, sink.getvalue())
-    shown = grace.get(place).text
-    assert "2 submissions can be accepted. 2 submissions are rejected." in words(shown)
-    assert "eve" in shown
-    assert "<script>alert" not in shown
+    visible_text = grace.get(place).text
+    assert "2 submissions can be accepted. 2 submissions are rejected." in words(visible_text)
+    assert "eve" in visible_text
+    assert "<script>alert" not in visible_text
     with web.store.reading() as session:
         assert session.scalar(select(func.count()).select_from(Job)) == 0
     answer = submit(grace, f"{place}/confirm")
     assert answer.status_code == 303
     batch = answer.headers["location"].partition("?")[0]
-    told = words(grace.get(batch).text)
+    page_text = words(grace.get(batch).text)
     for each in ("week one", "2 queued", "2 rejected", "ada", "bob", "eve"):
-        assert each in told
+        assert each in page_text
     with web.store.reading() as session:
         assert session.scalar(select(func.count()).select_from(Job).where(Job.state == JobState.QUEUED)) == 2
         (entry,) = audit.load_entries(session, "batch", batch.rpartition("/")[2])
@@ -104,11 +104,11 @@ def test_what_is_missing_known_and_new_is_said_before_it_is_taken_in(web: Web, g
         for trial in session.query(TrialRow):
             trial.verdict = "finished"
     alike = {f"{who}/{name}": f"{text}# ada\n" for who in ("ada", "bob") for name, text in ECHO.items()}
-    shown = words(grace.get(sent(grace, zipped(alike | {"eve/robot.py": "print(1)\n"}))).text)
-    assert "1 submission has no responder.py and gets no marks for the criteria that need it: eve" in shown
-    assert "1 student is not enrolled yet and will be enrolled: eve" in shown
-    assert "1 submission was submitted before and stays unchanged" in shown
-    assert "1 submission is identical to a graded submission" in shown
+    page_text = words(grace.get(sent(grace, zipped(alike | {"eve/robot.py": "print(1)\n"}))).text)
+    assert "1 submission has no responder.py and gets no marks for the criteria that need it: eve" in page_text
+    assert "1 student is not enrolled yet and will be enrolled: eve" in page_text
+    assert "1 submission was submitted before and stays unchanged" in page_text
+    assert "1 submission is identical to a graded submission" in page_text
 
 
 def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -> None:
@@ -116,10 +116,10 @@ def test_files_of_their_own_and_a_table_of_people(web: Web, grace: TestClient) -
     people = ("people", ("class.csv", b"id,name\nada,Ada Lovelace\n"))
     data = {"assignment": "echo-responder"}
     answer = submit(grace, f"{HOME}/batches/uploads", data, files=[*parts, people])
-    shown = words(grace.get(answer.headers["location"]).text)
-    assert "1 submission can be accepted. 1 submission is rejected." in shown
-    assert "Ada Lovelace" in shown
-    assert "bob is not in class.csv" in shown
+    page_text = words(grace.get(answer.headers["location"]).text)
+    assert "1 submission can be accepted. 1 submission is rejected." in page_text
+    assert "Ada Lovelace" in page_text
+    assert "bob is not in class.csv" in page_text
 
 
 @pytest.mark.parametrize(
@@ -193,9 +193,9 @@ def test_uploads_may_vanish_while_another_begins(web: Web, monkeypatch: pytest.M
     read = PendingUploads._read_metadata
 
     def read_and_remove(self: PendingUploads, upload_id: str) -> PendingUpload | None:
-        found = read(self, upload_id)
+        upload = read(self, upload_id)
         uploads.remove(first)
-        return found
+        return upload
 
     monkeypatch.setattr(PendingUploads, "_read_metadata", read_and_remove)
     second = uploads.begin(2, 1, "a")
@@ -244,13 +244,15 @@ def test_the_table_is_sorted_filtered_searched_and_cut(web: Web, grace: TestClie
 
 def test_the_pages_of_a_batch_ask_the_database_no_more_of_many_than_of_few(web: Web, grace: TestClient) -> None:
     few, many = a_batch(web, "ada"), a_batch(web, *(f"s{number}" for number in range(12)))
-    asked: list[str] = []
-    event.listen(web.store.engine, "before_cursor_execute", lambda *said: asked.append(said[2]))
+    statements: list[str] = []
+    event.listen(
+        web.store.engine, "before_cursor_execute", lambda *event_arguments: statements.append(event_arguments[2])
+    )
 
     def counted(path: str) -> int:
-        asked.clear()
+        statements.clear()
         assert grace.get(path).status_code == 200
-        return len(asked)
+        return len(statements)
 
     for part in ("", "/overview", "/progress"):
         counts = [counted(f"{HOME}/batches/{made.id}{part}") for made in (few, many)]
@@ -315,10 +317,10 @@ def test_what_a_newer_submission_took_the_place_of_leads_to_it(web: Web, grace: 
 def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, grace: TestClient) -> None:
     web.student("zoe")
     made = a_batch(web, "ada", "bob", refusals=(RejectedSubmission("x.zip", "is broken, expected a zip."),))
-    told = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
+    page_text = words(grace.get(f"{HOME}/batches/{made.id}/overview").text)
     for each in ("Graded 2", "Most common causes", "Not submitted Zoe", "x.zip is broken", "Find similar submissions"):
-        assert each in told, told
-    assert "Grace" not in told.partition("Not submitted")[2][:40]
+        assert each in page_text, page_text
+    assert "Grace" not in page_text.partition("Not submitted")[2][:40]
     everybody = grace.get(f"{HOME}/batches/{made.id}/overview?pass=0").text
     assert "Passed (0 per cent or more) 2 (100 %)" in words(everybody)
 
@@ -348,8 +350,8 @@ def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a
     assert "1 similar pair" in hidden
     assert not is_named("ada", hidden)
     answer = grace.get(f"/api/v1{path}", headers=web.token(web.instructor(), "read"))
-    (found,) = answer.json()["assignments"]
-    (pair,) = found["pairs"]
+    (document,) = answer.json()["assignments"]
+    (pair,) = document["pairs"]
     assert pair["share"] > 0.9
     assert {each["aspect"] for each in pair["trials"]} <= {"path", "messages", "faults"}
     assert all(student.startswith("Participant ") for student in pair["students"])
@@ -382,9 +384,9 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
     second = answer.headers["location"].rpartition("/")[2]
     assert "This submission is queued." in grace.get(answer.headers["location"]).text
     grade_all(web, report_builders.faulty_grade())
-    shown = words(grace.get(answer.headers["location"]).text)
-    assert "Regraded:" in shown
-    assert "Grading history" in shown
+    page_text = words(grace.get(answer.headers["location"]).text)
+    assert "Regraded:" in page_text
+    assert "Grading history" in page_text
     submit(grace, f"{HOME}/grades/{second}/publish")
     with web.store.reading() as session:
         assert session.get_one(Job, second).standing is Standing.STANDS
@@ -395,10 +397,10 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
 def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "ada", "bob", "cid")
     ids = {job.student: job.job_id for job in made.jobs}
-    shown = grace.get(f"{HOME}/grades/{ids['bob']}").text
-    assert "staff only" in shown
-    assert f'href="{HOME}/grades/{ids["ada"]}" rel="prev"' in shown
-    assert f'href="{HOME}/grades/{ids["cid"]}" rel="next"' in shown
+    page_text = grace.get(f"{HOME}/grades/{ids['bob']}").text
+    assert "staff only" in page_text
+    assert f'href="{HOME}/grades/{ids["ada"]}" rel="prev"' in page_text
+    assert f'href="{HOME}/grades/{ids["cid"]}" rel="next"' in page_text
     assert 'rel="prev"' not in grace.get(f"{HOME}/grades/{ids['ada']}").text
     german = grace.get(f"{HOME}/grades/{ids['bob']}", headers={"accept-language": "de"}).text
     assert '<p class="next" data-before="Als Nächstes:">Beheben Sie das in Ihrem Antwortprogramm' in german

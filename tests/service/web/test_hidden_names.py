@@ -67,16 +67,16 @@ def _grade_all(web: Web) -> None:
 def test_changes_of_a_regrade_are_in_the_order_of_the_shown_names(web: Web, grace: Member, regrade: str) -> None:
     token = web.token(grace, "read")
     changes = web.browser().get(f"{HERE}/batches/{regrade}/changes", headers=token).json()["items"]
-    shown = load_hidden_names(web.store, 1)
+    hidden_names = load_hidden_names(web.store, 1)
     assert [each["student"] for each in changes] == sorted(
-        shown.label_student("echo-responder", who) for who in STUDENTS
+        hidden_names.label_student("echo-responder", who) for who in STUDENTS
     )
 
 
 def test_the_page_of_changes_is_in_the_order_of_random_ids(web: Web, grace: Member, regrade: str) -> None:
     with web.store.reading() as session:
-        found = regrades.load_changes_page(session, regrade, 1, load_hidden_names(web.store, 1))
-    assert [each.job_id for each in found.changes] == sorted(each.job_id for each in found.changes)
+        hidden_names = regrades.load_changes_page(session, regrade, 1, load_hidden_names(web.store, 1))
+    assert [each.job_id for each in hidden_names.changes] == sorted(each.job_id for each in hidden_names.changes)
     text = web.browser(grace).get(f"/courses/1/batches/{regrade}/changes").text
     assert [who for who in STUDENTS if re.search(rf"\b{who}\b", text, re.IGNORECASE)] == []
 
@@ -110,8 +110,10 @@ def test_an_upload_that_is_not_new_names_nobody_beside_a_grade(web: Web, grace: 
     path = f"{HERE}/batches?assignment=echo-responder&name=again"
     headers = {**token, "content-type": "application/zip"}
     known = web.browser().post(path, headers=headers, content=again).json()["known"]
-    shown = load_hidden_names(web.store, 1)
-    assert [each["student"] for each in known] == sorted(shown.label_student("echo-responder", who) for who in STUDENTS)
+    hidden_names = load_hidden_names(web.store, 1)
+    assert [each["student"] for each in known] == sorted(
+        hidden_names.label_student("echo-responder", who) for who in STUDENTS
+    )
     browser = web.browser(grace)
     files = {"files": ("again.zip", again, "application/zip")}
     upload = submit(browser, "/courses/1/batches/uploads", {"assignment": "echo-responder"}, files=files)

@@ -52,7 +52,7 @@ def _assignment(hidden: int, *, first: bool, seconds: float) -> Assignment:
     """Return the echo assignment with a number of hidden scenarios and criteria. The total marks never change."""
     whole = echo()
     (own,) = whole.scenarios
-    shown = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)), seconds=90)
+    visible_scenario = replace(own, poses=tuple(Pose(x, 800, 0) for x in (100, 150, 200, 250)), seconds=90)
     others = tuple(replace(own, id=f"secret-{n}", visibility="hidden", seconds=seconds) for n in range(hidden))
     criteria = tuple(
         whole.criteria[0].model_copy(
@@ -61,7 +61,7 @@ def _assignment(hidden: int, *, first: bool, seconds: float) -> Assignment:
         for n in range(hidden)
     )
     limits = replace(whole.limits, program_cpu=0.5, responder_cpu=0.5)
-    scenarios = (*others, shown) if first else (shown, *others)
+    scenarios = (*others, visible_scenario) if first else (visible_scenario, *others)
     return replace(whole, scenarios=scenarios, criteria=(*whole.criteria, *criteria), limits=limits)
 
 
@@ -99,21 +99,23 @@ def _answers(
             batch_id = open_assignments.load_course_assignment(session, 1, assignment.id).batch_id or ""
         request = GradingRequest(submission, assignment, example)
         accepted = intake.accept_submission(web.store, request, max_attempts=3, batch_id=batch_id)
-        asked = StudentReader(web, ada, {"submission_id": str(accepted.submission_id), "assignment": assignment.id})
+        student_reader = StudentReader(
+            web, ada, {"submission_id": str(accepted.submission_id), "assignment": assignment.id}
+        )
         claim = jobs.claim_job(web.store, "worker", 60)
         assert claim is not None
         jobs.renew_lease(web.store, claim, 60, progress)
-        found = asked.everything("while it is graded")
+        responses = student_reader.everything("while it is graded")
         graded = _unjudged(grade(submission, assignment, secret=load_secret(web.store), runner=runner))
         jobs.finish_job(web.store, claim, results.prepare_grade(graded), datetime.now(UTC))
-        found |= asked.everything("graded")
+        responses |= student_reader.everything("graded")
         acting.publish(web.store, batch_id, actor="grace", includes_unjudged=True)
-        found |= asked.everything("published")
+        responses |= student_reader.everything("published")
         for form in ("moodle", "gradescope"):
-            found[form] = acting.export_file(web.store, batch_id, form, published=False).data.decode()
-        found["gradescope"] = _shown_by_gradescope(str(found["gradescope"]))
-        changing = {accepted.job_id: "JOB", batch_id: "BATCH", asked.word: "WORD"}
-        return {path: _without(changing, content) for path, content in found.items()}
+            responses[form] = acting.export_file(web.store, batch_id, form, published=False).data.decode()
+        responses["gradescope"] = _shown_by_gradescope(str(responses["gradescope"]))
+        changing = {accepted.job_id: "JOB", batch_id: "BATCH", student_reader.word: "WORD"}
+        return {path: _without(changing, content) for path, content in responses.items()}
 
 
 def _submission(example: str) -> Submission:

@@ -121,7 +121,7 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
         expect(page.locator("main")).to_contain_text("This releases 20 grades to their students.")
         assert_in_order(page)
         page.get_by_role("button", name="Publish all").click()
-        expect(page.locator(".told")).to_contain_text("20 grades published.")
+        expect(page.locator(".message")).to_contain_text("20 grades published.")
         expect(page.locator("td .tag.good")).to_have_count(20)
         batch = page.url
 
@@ -133,7 +133,7 @@ def test_from_the_assignment_to_publication(tmp_path: Path) -> None:
         assert_in_order(page)
         page.reload()
         student = browser.new_context(**PHONE).new_page()
-        student.goto(page.locator("#made").input_value())
+        student.goto(page.locator("#secret").input_value())
         student.locator("main button").click()
         student.get_by_role("link", name="Attempt 1").click()
         expect(student.locator("main")).to_contain_text("It answers every time.")

@@ -56,8 +56,13 @@ def _browser(web: Web) -> TestClient:
 
 
 def _begin(browser: TestClient, **changes: str) -> dict[str, str]:
-    asked = {"iss": ISSUER, "login_hint": "hint", "client_id": CLIENT, "target_link_uri": f"{SAME_SITE}/"} | changes
-    answer = browser.post("/lti/login", data=asked, headers={"sec-fetch-site": "cross-site"})
+    parameters = {
+        "iss": ISSUER,
+        "login_hint": "hint",
+        "client_id": CLIENT,
+        "target_link_uri": f"{SAME_SITE}/",
+    } | changes
+    answer = browser.post("/lti/login", data=parameters, headers={"sec-fetch-site": "cross-site"})
     assert answer.status_code == 303, answer.text
     return {name: values[0] for name, values in parse_qs(urlsplit(answer.headers["location"]).query).items()}
 
@@ -111,7 +116,7 @@ _NOW = int(time.time())
 
 
 @pytest.mark.parametrize(
-    ("changes", "header", "said"),
+    ("changes", "header", "sentence"),
     [
         pytest.param({"aud": "somebody else"}, {}, "token is invalid", id="for another client"),
         pytest.param({"aud": [CLIENT, "other"], "azp": "other"}, {}, "another tool", id="for another party"),
@@ -130,7 +135,7 @@ _NOW = int(time.time())
     ],
 )
 def test_a_word_that_is_not_to_be_trusted_signs_nobody_in(
-    launched: tuple[Web, LearningPlatform], changes: dict[str, Any], header: dict[str, Any], said: str
+    launched: tuple[Web, LearningPlatform], changes: dict[str, Any], header: dict[str, Any], sentence: str
 ) -> None:
     web, platform = launched
     browser = _browser(web)
@@ -138,7 +143,7 @@ def test_a_word_that_is_not_to_be_trusted_signs_nobody_in(
     token = platform.sign(platform.claims(begun, "grace", INSTRUCTOR, **changes), **header)
     answer = _end(browser, begun["state"], token)
     assert answer.status_code == 422
-    assert said in answer.text
+    assert sentence in answer.text
     assert browser.get("/account").status_code == 303
 
 

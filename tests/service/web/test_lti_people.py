@@ -88,9 +88,9 @@ def test_a_person_known_from_one_course_takes_nobodys_place_in_another(store: St
             launch(store, platform, "mallory", context="c2", id=id)
     with store.reading() as session:
         assert victim is not None
-        found = {each.id: (each.person_id, each.role) for each in membership.list_members(session, victim.course_id)}
-        assert found["victim"] == (victim.person_id, STUDENT)
-        assert found["grace"][1] is INSTRUCTOR
+        members = {each.id: (each.person_id, each.role) for each in membership.list_members(session, victim.course_id)}
+        assert members["victim"] == (victim.person_id, STUDENT)
+        assert members["grace"][1] is INSTRUCTOR
     # An unused id becomes theirs.
     other = launch(store, platform, "mallory", context="c2", id="mallory")
     first = launch(store, platform, "mallory", context="c1")
@@ -166,8 +166,8 @@ def test_a_platform_makes_no_course_that_is_the_installations_own(store: Store, 
 
 def test_launches_at_once_make_one_course_and_one_person(store: Store, platform: Platform) -> None:
     with ThreadPoolExecutor(4) as pool:
-        found = set(pool.map(lambda _: launch(store, platform, "grace", INSTRUCTOR), range(8)))
-    assert len(found) == 1
+        launches = set(pool.map(lambda _: launch(store, platform, "grace", INSTRUCTOR), range(8)))
+    assert len(launches) == 1
     with store.reading() as session:
         assert len(membership.list_members(session, 1)) == 1
 
@@ -227,8 +227,8 @@ def test_every_address_of_a_platform_has_an_origin(store: Store, which: int, add
 
 
 def test_long_ids_of_people_stay_apart(store: Store, platform: Platform) -> None:
-    found = [launch(store, platform, end, INSTRUCTOR, id="x" * 300 + end) for end in "ab"]
-    assert len({each.person_id for each in found if each is not None}) == 2
+    launches = [launch(store, platform, end, INSTRUCTOR, id="x" * 300 + end) for end in "ab"]
+    assert len({each.person_id for each in launches if each is not None}) == 2
     with pytest.raises(UsageError, match="longer than 500"):
         launch(store, platform, "c", id="x" * 501)
 
@@ -266,10 +266,10 @@ def test_services_are_only_asked_where_an_operator_registered_them(
     store: Store, monkeypatch: pytest.MonkeyPatch, url: str, allowed: bool
 ) -> None:
     platform = register(store, "https://services.example.org")
-    asked: list[str] = []
+    requested_urls: list[str] = []
 
     def fetched(url: str, **_: object) -> PlatformReply:
-        asked.append(url)
+        requested_urls.append(url)
         return PlatformReply({"access_token": "t", "members": [], "id": url}, "")
 
     monkeypatch.setattr(services, "fetch_json", fetched)
@@ -285,7 +285,7 @@ def test_services_are_only_asked_where_an_operator_registered_them(
         with pytest.raises(PlatformError, match="not registered"):
             ask()
     # Not even a token was requested.
-    assert asked == []
+    assert requested_urls == []
 
 
 @pytest.mark.parametrize("where", ["next page", "column"])
@@ -293,10 +293,10 @@ def test_what_a_platform_names_itself_is_only_asked_where_it_is_registered(
     store: Store, platform: Platform, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
     inside = "http://127.0.0.1:9/inside"
-    asked: list[str] = []
+    requested_urls: list[str] = []
 
     def fetched(url: str, *, method: str = "GET", **_: object) -> PlatformReply:
-        asked.append(url)
+        requested_urls.append(url)
         if url.endswith("/token"):
             return PlatformReply({"access_token": "t"}, "")
         if where == "next page":
@@ -312,7 +312,7 @@ def test_what_a_platform_names_itself_is_only_asked_where_it_is_registered(
     }
     with pytest.raises(PlatformError, match=r"uses http://127\.0\.0\.1:9 for a service"):
         ask[where]()
-    assert not [each for each in asked if "127.0.0.1" in each]
+    assert not [each for each in requested_urls if "127.0.0.1" in each]
 
 
 _LAUNCHES = st.lists(

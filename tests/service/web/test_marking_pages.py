@@ -54,9 +54,9 @@ def test_marks_are_set_excused_and_withdrawn_and_all_is_told(marked: Marked) -> 
     answer = submit(marked.grace, f"{marked.marking}/set", {**about, "marks": f"{most}"})
     assert (answer.status_code, answer.headers["location"]) == (303, marked.marking)
     assert marked.marks() == (before[0] + float(most - CRITERION.marks), before[1])
-    shown = marked.grace.get(marked.marking).text
-    assert "adjusted by staff" in shown
-    assert "<script>alert" not in shown
+    page_text = marked.grace.get(marked.marking).text
+    assert "adjusted by staff" in page_text
+    assert "<script>alert" not in page_text
     with marked.web.store.reading() as session:
         entry = audit.load_entries(session, "submission", "1")[-1]
     assert entry.actor.startswith("Grace (person")
@@ -82,11 +82,11 @@ def test_it_says_whose_work_is_marked_unless_names_are_hidden(marked: Marked) ->
     assert "Ada (ada) · Echo" in marked.grace.get(marked.marking).text
     path = "/courses/1/assignments/echo-responder/names"
     submit(marked.grace, path, {"hidden": "true"})
-    shown = marked.grace.get(marked.marking).text
+    page_text = marked.grace.get(marked.marking).text
     submit(marked.grace, path, {"hidden": "false"})
     called = load_hidden_names(marked.web.store, 1).label_student
-    assert "Participant" in shown
-    assert "Ada" not in shown
+    assert "Participant" in page_text
+    assert "Ada" not in page_text
     assert called("echo-responder", "ada") == "ada"
 
 
@@ -117,11 +117,11 @@ def test_what_cannot_be_is_said_in_one_sentence(marked: Marked, path: str, data:
 def test_a_comment_is_shown_and_withdrawn(marked: Marked) -> None:
     submit(marked.grace, f"{marked.marking}/comment", {"text": f"Look at {HOSTILE}"})
     submit(marked.grace, f"{marked.marking}/comment", {"text": "And here.", "criterion": CRITERION.id})
-    shown = marked.grace.get(marked.marking).text
-    assert "Look at &lt;script&gt;" in shown
+    page_text = marked.grace.get(marked.marking).text
+    assert "Look at &lt;script&gt;" in page_text
     with marked.web.store.reading() as session:
-        said = results.load_grade(session, marked.world.values["job_id"]).comments
-    assert [each.criterion for each in said] == ["", CRITERION.id]
+        comments = results.load_grade(session, marked.world.values["job_id"]).comments
+    assert [each.criterion for each in comments] == ["", CRITERION.id]
     submit(marked.grace, f"{marked.marking}/uncomment", {"comment_id": "2"})
     left = marked.grace.get(marked.marking).text
     assert 'name="comment_id" value="1"' in left
@@ -138,9 +138,9 @@ def test_a_student_asks_and_an_instructor_answers(marked: Marked) -> None:
     answer = submit(marked.grace, f"/courses/1/appeals/{number}/answer", {"text": f"Line 3 {HOSTILE}"})
     assert answer.headers["location"] == "/courses/1/appeals"
     assert "No open appeals." in marked.grace.get("/courses/1/appeals").text
-    shown = marked.ada.get(path).text
-    assert "Line 3 &lt;script&gt;" in shown
-    assert "person" not in shown
+    page_text = marked.ada.get(path).text
+    assert "Line 3 &lt;script&gt;" in page_text
+    assert "person" not in page_text
     report = marked.ada.get(path.removesuffix("/appeal")).text
     assert "Line 3 &lt;script&gt;" in report
     assert report.index("Please look again.") < report.index('class="score"')

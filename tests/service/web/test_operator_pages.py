@@ -33,8 +33,8 @@ def test_attempts_that_were_lost_are_told_and_count_against_nobody(web: Web) -> 
     assert "2 grading attempts failed because of the system" in page
     assert "No failed jobs." in page
     token = web.token(web.operator(), "read")
-    told = web.browser().get("/api/v1/operator", headers=token).json()
-    assert (told["host_faults"], told["dead"]) == (2, 0)
+    document = web.browser().get("/api/v1/operator", headers=token).json()
+    assert (document["host_faults"], document["dead"]) == (2, 0)
 
 
 def test_what_could_not_be_graded_is_listed_with_its_reason_and_queued_again(web: Web) -> None:

@@ -86,16 +86,16 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
             return labels[student] if assignment in names.assignments else student
 
         patch.setattr(HiddenNames, "label_student", called)
-        asked = _Asked(web, course)
-        before = asked.everything()
+        page_reader = _PageReader(web, course)
+        before = page_reader.everything()
         renamed = dict(zip(_EVERYBODY, reversed(_EVERYBODY), strict=True))
         with web.store.transaction() as session:
             rename_students(session, renamed)
         labels = {renamed[who]: label for who, label in labels.items()}
-        yield Answers(course, before, asked.everything())
+        yield Answers(course, before, page_reader.everything())
 
 
-class _Asked:
+class _PageReader:
     """An instructor's browser and program."""
 
     def __init__(self, web: Web, course: NamelessCourse) -> None:
@@ -119,10 +119,10 @@ class _Asked:
 
 def _routes(web: Web) -> list[str]:
     """Return the routes for instructors of a course, except those without data about students."""
-    found = {str(each.path) for each in iter_route_contexts(web.app.routes) if "GET" in (each.methods or ())}
+    paths = {str(each.path) for each in iter_route_contexts(web.app.routes) if "GET" in (each.methods or ())}
     return sorted(
         path
-        for path in found
+        for path in paths
         if path.removeprefix(API).startswith(_COURSE) and "/mine" not in path and path not in _OF_NO_STUDENT
     )
 
@@ -138,11 +138,11 @@ def _content(answer: Response) -> bytes | dict[str, bytes]:
 def _texts(answer: Response) -> str:
     """Return all texts of an answer, including cursors of the next page."""
     content = _content(answer)
-    found = content if isinstance(content, dict) else {"": content}
+    members = content if isinstance(content, dict) else {"": content}
     places = re.findall(r'"next":"([\w-]+)"', answer.text)
-    told = [base64.urlsafe_b64decode(place + "=" * (-len(place) % 4)) for place in places]
+    parts = [base64.urlsafe_b64decode(place + "=" * (-len(place) % 4)) for place in places]
     header = " ".join(answer.headers.values())
-    return "\n".join([header, *found, *(data.decode("utf-8", "replace") for data in (*found.values(), *told))])
+    return "\n".join([header, *members, *(data.decode("utf-8", "replace") for data in (*members.values(), *parts))])
 
 
 def test_every_route_answers(answers: Answers) -> None:
@@ -151,35 +151,35 @@ def test_every_route_answers(answers: Answers) -> None:
 
 
 def test_no_answer_depends_on_the_names(answers: Answers) -> None:
-    found = {
+    differences = {
         route
         for (route, path), answer in answers.before.items()
         if route not in _WITH_NAMES and _content(answer) != _content(answers.after[route, path])
     }
-    assert found == set()
+    assert differences == set()
 
 
 def test_no_other_answer_has_a_name(answers: Answers) -> None:
     names = [name for who in _EVERYBODY for name in names_of(who)]
-    found = {
+    leaks = {
         (route, name)
         for (route, _), answer in answers.before.items()
         if route not in _WITH_NAMES
         for name in names
         if is_named(name, _texts(answer))
     }
-    assert found == set()
+    assert leaks == set()
 
 
 def test_answers_with_names_share_no_value_with_rows_without(answers: Answers) -> None:
     """A time, size, number, id or hash that occurs in both would identify the student of a row."""
     values = {key: _values(answer) for key, answer in answers.before.items()}
-    named = {key: found for key, found in values.items() if key[0] in _WITH_NAMES}
-    nameless = set().union(*(found for key, found in values.items() if key not in named))
+    named = {key: texts for key, texts in values.items() if key[0] in _WITH_NAMES}
+    nameless = set().union(*(texts for key, texts in values.items() if key not in named))
     known = {each for who in _EVERYBODY for each in _in_text(" ".join(names_of(who)))}
     for route in {route for route, _ in named if "{enrolment_id}" in route}:
-        known |= set.intersection(*(found for key, found in named.items() if key[0] == route))
-    assert {(route, value) for (route, _), found in named.items() for value in (found - known) & nameless} == set()
+        known |= set.intersection(*(texts for key, texts in named.items() if key[0] == route))
+    assert {(route, value) for (route, _), texts in named.items() for value in (texts - known) & nameless} == set()
 
 
 def _values(answer: Response) -> set[str]:

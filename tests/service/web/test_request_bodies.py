@@ -58,7 +58,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, dict[
         yield web, made.values, {"instructor": made.grace, "owner": made.ada, "student": made.ada, "operator": operator}
 
 
-def _asked(web: Web, route: str, values: dict[str, str], headers: dict[str, str], megabytes: int) -> _Seen:
+def _request_route(web: Web, route: str, values: dict[str, str], headers: dict[str, str], megabytes: int) -> _Seen:
     """Send a body in pieces of a megabyte directly to the application, and count how much of it is read."""
     method, path = route.split()
     path = filled(path, values)
@@ -109,7 +109,7 @@ def test_nothing_is_read_of_somebody_unknown(
     web, values, _ = world
     wrong = {"authorization": "Bearer rmt_wrong", "cookie": "robomark=rms_wrong"}
     for headers in ({}, wrong):
-        seen = _asked(web, route, values, {"content-type": "application/x-www-form-urlencoded", **headers}, 3)
+        seen = _request_route(web, route, values, {"content-type": "application/x-www-form-urlencoded", **headers}, 3)
         if ROUTES[route].split()[0] == "anybody":
             assert (seen.status, seen.read) == (413, 1)
         else:
@@ -130,10 +130,10 @@ def test_two_megabytes_are_too_much_but_for_uploads(
     headers = {"content-type": kind, **_signed(web, route, members)}
     most = _UPLOADS.get(route, 1)
     long = {**headers, "content-length": str(most * 2**20 + 1)}
-    assert _asked(web, route, values, long, 3) == _Seen(413, 0)
+    assert _request_route(web, route, values, long, 3) == _Seen(413, 0)
     # A body without a declared length is read up to the limit, unless the route does not read bodies.
     if most == 1:
-        seen = _asked(web, route, values, headers, 3)
+        seen = _request_route(web, route, values, headers, 3)
         assert seen.status == 413 or seen.read == 0
 
 
@@ -161,9 +161,9 @@ def test_nothing_is_read_of_an_upload_that_its_route_refuses(
     other = members["owner" if ROUTES[route].startswith("instructor") else "instructor"]
     browser = web.browser(other)
     headers = {"cookie": f"robomark={browser.cookies['robomark']}", "content-type": "multipart/form-data; boundary=x"}
-    assert _asked(web, route, values, headers, 3) == _Seen(404, 0)
+    assert _request_route(web, route, values, headers, 3) == _Seen(404, 0)
     for number in ("9" * 30, "9" * 5000):
-        assert _asked(web, route, {**values, "course_id": number}, headers, 3) == _Seen(404, 0)
+        assert _request_route(web, route, {**values, "course_id": number}, headers, 3) == _Seen(404, 0)
 
 
 def test_json_is_parsed_in_another_thread_and_within_bounds(
@@ -202,7 +202,7 @@ def test_forms_in_another_charset_are_not_read(
     headers = {"content-type": "Multipart/Form-Data; boundary=x; charset=punycode"}
     if ROUTES[route].split()[0] != "anybody":
         headers |= _signed(web, route, members)
-    assert _asked(web, route, values, headers, 1) == _Seen(415, 0)
+    assert _request_route(web, route, values, headers, 1) == _Seen(415, 0)
 
 
 @pytest.mark.parametrize("charset", ['"idna"', "unicode_escape", "utf-7", "utf-16", "latin-1", "utf-8; charset=idna"])
@@ -210,7 +210,7 @@ def test_forms_in_any_other_charset_are_not_read(
     charset: str, world: tuple[Web, dict[str, str], dict[str, Member]]
 ) -> None:
     headers = {"content-type": f"multipart/form-data; boundary=x; charset={charset}"}
-    assert _asked(world[0], "POST /language", {}, headers, 1) == _Seen(415, 0)
+    assert _request_route(world[0], "POST /language", {}, headers, 1) == _Seen(415, 0)
 
 
 @pytest.mark.parametrize("charset", ["", "; charset=UTF-8", '; charset="utf-8"'])

@@ -25,9 +25,9 @@ def test_a_link_counts_once_and_only_when_its_button_is_pressed(web: Web) -> Non
     link = web.link(web.student())
     browser, other = web.browser(), web.browser()
     for _ in range(3):
-        shown = browser.get(f"/sign-in/{link}")
-        assert "This link signs you in as Ada" in shown.text
-        assert SESSION_COOKIE not in shown.cookies
+        response = browser.get(f"/sign-in/{link}")
+        assert "This link signs you in as Ada" in response.text
+        assert SESSION_COOKIE not in response.cookies
     answer = browser.post("/sign-in", data={"secret": f"http://localhost/sign-in/{link}", "next": "/account"})
     assert (answer.status_code, answer.headers["location"]) == (303, "/account")
     cookie = answer.headers["set-cookie"]
@@ -170,9 +170,9 @@ def test_an_instructor_of_two_courses_is_one_person_once_an_operator_joins_them(
     assert first.person_id != second.person_id
     assert other.role is Role.STUDENT
     web.join(first, second)
-    shown = web.browser(first).get("/").text
-    assert 'href="/courses/1/batches">one</a>' in shown
-    assert 'href="/courses/2/batches">two</a>' in shown
+    page_text = web.browser(first).get("/").text
+    assert 'href="/courses/1/batches">one</a>' in page_text
+    assert 'href="/courses/2/batches">two</a>' in page_text
 
 
 def test_a_student_does_not_become_an_instructor_under_their_own_sessions(web: Web) -> None:

@@ -23,8 +23,8 @@ def signs_in(web: Web, secret: str) -> bool:
 
 
 def shown_at(browser: TestClient, where: str) -> str | None:
-    found = _SECRET.search(browser.get(where).text)
-    return None if found is None else found[1]
+    match = _SECRET.search(browser.get(where).text)
+    return None if match is None else match[1]
 
 
 def test_a_link_is_shown_again_until_it_is_used(web: Web, grace: TestClient) -> None:
@@ -74,10 +74,10 @@ def test_a_whole_course_has_its_links_in_one_table(web: Web, grace: TestClient) 
     assert "in other courses" in rows["dan"]["reason"]
     assert not signs_in(web, before)
     for who in ("ada", "bob"):
-        found = _SECRET.search(rows[who]["link"])
-        assert found
-        assert signs_in(web, found[1])
-        assert not signs_in(web, found[1])
+        match = _SECRET.search(rows[who]["link"])
+        assert match
+        assert signs_in(web, match[1])
+        assert not signs_in(web, match[1])
     with web.store.reading() as session:
         (entry,) = audit.load_entries(session, "course", "1")
     assert (entry.action, entry.actor, entry.detail) == ("links", "Grace (person 1)", {"students": 3, "days": 3})

@@ -45,11 +45,11 @@ def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(tmp_pa
         plots.store_plots(web.store, world.values["job_id"], {"path": b"PNG"})
         browsers, tokens = _sign_in(web, world)
         crowd(web, world, range(1))
-        few = {asked: _count(web.store, *asked, browsers, tokens, world) for asked in _all_asked()}
+        few = {each: _count(web.store, *each, browsers, tokens, world) for each in _all_asked()}
         crowd(web, world, range(1, 50))
-        many = {asked: _count(web.store, *asked, browsers, tokens, world) for asked in _all_asked()}
-    assert {asked: count for asked, count in many.items() if count > MOST} == {}
-    assert {asked: (few[asked], count) for asked, count in many.items() if count > few[asked]} == {}
+        many = {each: _count(web.store, *each, browsers, tokens, world) for each in _all_asked()}
+    assert {each: count for each, count in many.items() if count > MOST} == {}
+    assert {each: (few[each], count) for each, count in many.items() if count > few[each]} == {}
 
 
 def _all_asked() -> list[tuple[str, str]]:

@@ -92,9 +92,9 @@ def test_no_gradebook_has_an_attempt_over_a_limit(web: Web) -> None:
     _, batch_id = _submit(web, "print('again')\n")
     with web.store.reading() as session:
         over = session.scalars(select(Job.id).where(Job.batch_id == batch_id)).one()
-    found = _gradebooks(web, batch_id)
-    assert found
-    assert [name for name, text in found.items() if over in text or "attempt 2" in text] == []
+    gradebooks = _gradebooks(web, batch_id)
+    assert gradebooks
+    assert [name for name, text in gradebooks.items() if over in text or "attempt 2" in text] == []
 
 
 def _submit(web: Web, program: str = PROGRAM) -> tuple[Member, str]:
@@ -116,22 +116,22 @@ def _read_by_students(web: Web, ada: Member, batch_id: str, job_id: str, secret:
     values = {"submission_id": str(submission_id), "assignment": "echo-responder"}
     answers = StudentReader(web, ada, values).everything()
     assert any("200" in str(answer)[:4] for answer in answers.values())
-    found = {path: str(answer) for path, answer in answers.items()} | _gradebooks(web, batch_id)
-    return [path for path, text in found.items() if secret in text]
+    texts = {path: str(answer) for path, answer in answers.items()} | _gradebooks(web, batch_id)
+    return [path for path, text in texts.items() if secret in text]
 
 
 def _gradebooks(web: Web, batch_id: str) -> dict[str, str]:
     """Return the output of each format that students see, where it has any for the batch."""
-    found = {}
+    gradebooks = {}
     for name in FORMATS.keys() - _STAFF_FORMATS:
         given = _WORKSHEET if FORMATS[name].worksheet is not None else ""
         try:
             data = acting.export_file(web.store, batch_id, name, published=False, given=given).data
         except UsageError as error:
-            found[name] = str(error)
+            gradebooks[name] = str(error)
             continue
-        found[name] = _unzipped(data) if data.startswith(b"PK") else data.decode()
-    return found
+        gradebooks[name] = _unzipped(data) if data.startswith(b"PK") else data.decode()
+    return gradebooks
 
 
 def _unzipped(data: bytes) -> str:

@@ -65,9 +65,9 @@ def _actor(web: Web, member: Member) -> Actor:
     with web.store.transaction() as session:
         started = credentials.redeem_link(session, web.link(member))
         assert started is not None
-        found = credentials.identify(session, started.secret, CredentialKind.SESSION)
-    assert found is not None
-    return build_actor(found)
+        session_owner = credentials.identify(session, started.secret, CredentialKind.SESSION)
+    assert session_owner is not None
+    return build_actor(session_owner)
 
 
 def _submit(web: Web, member: Member, *files: tuple[str, bytes | str]) -> AcceptedSubmission:
@@ -157,10 +157,10 @@ def test_an_assignment_that_closes_before_the_submission_is_stored_takes_none(
 ) -> None:
     accept = intake.accept_submission
 
-    def close_then_accept(*asked: Any, **options: Any) -> AcceptedSubmission:
+    def close_then_accept(*arguments: Any, **options: Any) -> AcceptedSubmission:
         with web.store.transaction() as session:
             open_assignments.close_assignment(session, 1, echo().id)
-        return accept(*asked, **options)
+        return accept(*arguments, **options)
 
     monkeypatch.setattr(intake, "accept_submission", close_then_accept)
     with pytest.raises(UsageError, match="is closed"):
@@ -231,8 +231,8 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     assert _rows(once, ada) == [(1, False, JobState.DONE), (6, True, JobState.CANCELLED)]
     assert jobs.claim_job(once.store, "worker", 60) is None
     path = f"/courses/1/grades/{made[-1].job_id}"
-    shown = words(once.browser(ada).get(f"/courses/1/mine/submissions/{made[-1].submission_id}").text)
-    assert "no attempts left" in shown
+    page_text = words(once.browser(ada).get(f"/courses/1/mine/submissions/{made[-1].submission_id}").text)
+    assert "no attempts left" in page_text
     browser = once.browser(grace)
     assert "Grade this submission" in browser.get(path).text
     assert submit_form(browser, f"{path}/grade-over-limit").status_code == 303
@@ -244,8 +244,8 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     last = _send(once, ada, 7)
     assert [state for _, _, state in _rows(once, ada)] == [JobState.DONE, JobState.DONE, JobState.CANCELLED]
     token = once.token(grace, "mark")
-    asked = once.browser().post(f"/api/v1/courses/1/grades/{last.job_id}/over-limit", headers=token)
-    assert asked.status_code == 204
+    response = once.browser().post(f"/api/v1/courses/1/grades/{last.job_id}/over-limit", headers=token)
+    assert response.status_code == 204
     assert (
         once.browser()
         .post(f"/api/v1/courses/1/grades/{last.job_id}/over-limit", headers=once.token(ada, "mark"))

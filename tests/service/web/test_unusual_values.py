@@ -27,14 +27,14 @@ pytestmark = pytest.mark.long
 
 
 @pytest.fixture
-def asked(service_settings: Settings) -> Iterator[tuple[Web, World]]:
+def served_world(service_settings: Settings) -> Iterator[tuple[Web, World]]:
     changes = {"database_url": service_settings.database_url, "api_calls_per_minute": 1_000_000}
     with web_in(service_settings.home, **changes) as web:
         yield web, make_world(web)
 
 
-def test_no_page_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
-    web, world = asked
+def test_no_page_fails_by_an_unusual_value(served_world: tuple[Web, World]) -> None:
+    web, world = served_world
     browsers = {
         who: web.browser(member, raise_server_exceptions=False)
         for who, member in (("student", world.ada), ("instructor", world.grace), ("operator", web.operator()))
@@ -54,8 +54,8 @@ def test_no_page_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
     assert failed == set()
 
 
-def test_no_route_of_the_api_fails_by_an_unusual_value(asked: tuple[Web, World]) -> None:
-    web, world = asked
+def test_no_route_of_the_api_fails_by_an_unusual_value(served_world: tuple[Web, World]) -> None:
+    web, world = served_world
     members = {"student": world.ada, "instructor": world.grace, "operator": web.operator()}
     tokens = {who: web.token(member, *SCOPES) for who, member in members.items()}
     browser = web.browser(raise_server_exceptions=False)

@@ -41,9 +41,9 @@ def grace(web: Web) -> TestClient:
 
 def batch_of(web: Web) -> str:
     with web.store.reading() as session:
-        found = open_assignments.load_course_assignment(session, 1, "echo-responder").batch_id
-    assert found is not None
-    return found
+        course_assignment = open_assignments.load_course_assignment(session, 1, "echo-responder").batch_id
+    assert course_assignment is not None
+    return course_assignment
 
 
 def send(web: Web, member: Member, program: str = PROGRAM) -> None:
@@ -99,11 +99,11 @@ def test_what_is_over_a_limit_counts_where_there_is_nothing_else(web: Web, grace
     send(web, bob)
     grade_with(web)
     with web.store.reading() as session:
-        found = {
+        states = {
             line.student: (line.attempt, line.staff_only) for line in job_lines.load_job_lines(session, batch_of(web))
         }
-    assert found["ada"] == (1, None)
-    assert found["bob"][1] is not None
+    assert states["ada"] == (1, None)
+    assert states["bob"][1] is not None
 
 
 def test_nobody_has_submitted_yet(web: Web, grace: TestClient) -> None:
@@ -138,8 +138,8 @@ def test_it_is_finished_when_the_assignment_is_closed(web: Web, grace: TestClien
     grade_with(web)
     assert told_outbox.claim_deliveries(web.store, 9) == []
     submit(grace, "/courses/1/assignments/echo-responder/close")
-    (told,) = told_outbox.claim_deliveries(web.store, 9)
-    assert told.payload["data"] == {"batch": batch_of(web), "states": {"done": 1}}
+    (deliveries,) = told_outbox.claim_deliveries(web.store, 9)
+    assert deliveries.payload["data"] == {"batch": batch_of(web), "states": {"done": 1}}
     with web.store.reading() as session:
         assert not batches.load_batch(session, batch_of(web)).takes_in
 

@@ -32,11 +32,11 @@ def test_pages_run_and_load_nothing_but_our_files_and_are_kept_nowhere(web: Web)
         assert headers["cache-control"] == "no-store"
         assert headers["referrer-policy"] == "no-referrer"
         assert "server" not in headers
-    shown = browser.get("/account").text
-    assert "<style" not in shown
-    assert " style=" not in shown
-    assert " onclick" not in shown
-    css = shown.split('rel="stylesheet" href="')[1].split('"')[0]
+    page_text = browser.get("/account").text
+    assert "<style" not in page_text
+    assert " style=" not in page_text
+    assert " onclick" not in page_text
+    css = page_text.split('rel="stylesheet" href="')[1].split('"')[0]
     assert "immutable" in browser.get(css).headers["cache-control"]
 
 
@@ -239,10 +239,10 @@ def test_hostile_names_are_shown_and_nothing_more(web: Web) -> None:
     name = "<script>alert(1)</script>\"' onload=x \u202egnp.exe"
     browser = web.browser(web.instructor())
     submit(browser, "/account/tokens", {"name": name, "scopes": "read", "word": "w"})
-    shown = browser.get("/account").text
-    assert "<script>alert" not in shown
-    assert "\u202e" not in shown
-    assert "&lt;script&gt;" in shown
+    page_text = browser.get("/account").text
+    assert "<script>alert" not in page_text
+    assert "\u202e" not in page_text
+    assert "&lt;script&gt;" in page_text
 
 
 def test_a_bucket_fills_with_time() -> None:

@@ -28,7 +28,7 @@ class Endpoint:
 
     status: int = 200
     headers: dict[str, str] = field(default_factory=dict)
-    told: list[tuple[dict[str, str], bytes]] = field(default_factory=list)
+    deliveries: list[tuple[dict[str, str], bytes]] = field(default_factory=list)
     url: str = ""
 
 
@@ -39,7 +39,7 @@ def endpoint() -> Iterator[Endpoint]:
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers["content-length"]))
-            answering.told.append(({name.lower(): value for name, value in self.headers.items()}, body))
+            answering.deliveries.append(({name.lower(): value for name, value in self.headers.items()}, body))
             self.send_response(answering.status)
             for name, value in answering.headers.items():
                 self.send_header(name, value)
@@ -74,7 +74,7 @@ def send_due_deliveries(store: Store, others: Networks) -> int:
 def test_a_delivery_arrives_with_its_signature(store: Store, endpoint: Endpoint) -> None:
     secret = hooked(store, endpoint.url)
     assert send_due_deliveries(store, ALL_NETWORKS) == 1
-    ((headers, body),) = endpoint.told
+    ((headers, body),) = endpoint.deliveries
     assert headers["robomark-event"] == "grades.published"
     at, signed = (part.split("=")[1] for part in headers["robomark-signature"].split(","))
     assert signed == hmac.new(secret.encode(), f"{at}.".encode() + body, hashlib.sha256).hexdigest()
@@ -89,7 +89,7 @@ def test_what_is_answered_otherwise_has_not_arrived(store: Store, endpoint: Endp
     hooked(store, endpoint.url)
     endpoint.status, endpoint.headers = status, {"location": endpoint.url}
     send_due_deliveries(store, ALL_NETWORKS)
-    assert len(endpoint.told) == 1
+    assert len(endpoint.deliveries) == 1
     with store.reading() as session:
         (line,) = webhooks.list_deliveries(session, 1, 10, None)
     assert line.delivered_at is None
@@ -99,7 +99,7 @@ def test_what_is_answered_otherwise_has_not_arrived(store: Store, endpoint: Endp
 def test_nothing_goes_inside_unless_the_operator_says_so(store: Store, endpoint: Endpoint) -> None:
     hooked(store, endpoint.url)
     send_due_deliveries(store, NO_NETWORKS)
-    assert endpoint.told == []
+    assert endpoint.deliveries == []
     with store.reading() as session:
         (line,) = webhooks.list_deliveries(session, 1, 10, None)
     assert "is not the name of a public address" in (line.error or "")

@@ -143,9 +143,9 @@ def _product_files() -> Iterator[tuple[str, Path]]:
 
 
 def test_every_format_is_read_by_its_reader() -> None:
-    found = {(name, call) for name, path in _product_files() for call in parser_calls(path.read_text("utf-8"))}
-    assert found - _ALLOWED.keys() == set(), "read it with a module of sim.readers"
-    assert _ALLOWED.keys() - found == set(), "these are read by their readers now: strike them from the list"
+    document = {(name, call) for name, path in _product_files() for call in parser_calls(path.read_text("utf-8"))}
+    assert document - _ALLOWED.keys() == set(), "read it with a module of sim.readers"
+    assert _ALLOWED.keys() - document == set(), "these are read by their readers now: strike them from the list"
 
 
 @pytest.mark.parametrize(

@@ -221,13 +221,13 @@ def test_broken_quotes_cost_the_same_for_each_row(line: str) -> None:
 
 
 def test_a_row_with_broken_quotes_costs_itself_alone() -> None:
-    found = list(read_records(["id,name\n", 'ada,"Ada\n', "bob,Bob\n"], ","))
-    assert [(each.line, each.broken) for each in found] == [(1, False), (2, True), (3, False)]
+    records = list(read_records(["id,name\n", 'ada,"Ada\n', "bob,Bob\n"], ","))
+    assert [(each.line, each.broken) for each in records] == [(1, False), (2, True), (3, False)]
 
 
 def test_a_row_of_several_lines_is_one_row() -> None:
-    (found,) = read_records(['ada,"one\n', "two\n", 'three"\n'], ",")
-    assert list(found.cells) == ["ada", "one\ntwo\nthree"]
+    (records,) = read_records(['ada,"one\n', "two\n", 'three"\n'], ",")
+    assert list(records.cells) == ["ada", "one\ntwo\nthree"]
 
 
 _NAMES = st.text("abc-_1", min_size=1, max_size=4)

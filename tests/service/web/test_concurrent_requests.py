@@ -56,8 +56,8 @@ def _opened(web: Web) -> None:
 
 def _first_policies(web: Web) -> list[Response]:
     headers = web.token(web.instructor(), "manage")
-    asked = {"json": {"assignment": "", "attempts": 1}, "headers": headers}
-    return _at_once(web, *[("PUT", "/api/v1/courses/1/policies", asked)] * 6)
+    request_options = {"json": {"assignment": "", "attempts": 1}, "headers": headers}
+    return _at_once(web, *[("PUT", "/api/v1/courses/1/policies", request_options)] * 6)
 
 
 def _first_extensions(web: Web) -> list[Response]:
@@ -76,7 +76,7 @@ def _opposite_joins(web: Web) -> list[Response]:
     ids = [web.instructor(name, f"course of {name}").enrolment_id for name in ("grace", "hopper")]
     pairs = (ids, ids[::-1])
     paths = [(f"/api/v1/operator/people/{one}/join", {"json": {"other": other}}) for one, other in pairs]
-    return _at_once(web, *[("POST", path, {**asked, "headers": headers}) for path, asked in paths])
+    return _at_once(web, *[("POST", path, {**each, "headers": headers}) for path, each in paths])
 
 
 def _removals(web: Web) -> list[Response]:
@@ -118,11 +118,11 @@ def test_a_student_who_is_removed_while_they_submit_stays_removed(web: Web, monk
     _opened(web)
     browser = web.browser(ada)
 
-    def accept_too_late(*asked: Any, **options: Any) -> intake.AcceptedSubmission:
+    def accept_too_late(*arguments: Any, **options: Any) -> intake.AcceptedSubmission:
         privacy.erase_student(web.app.state.context.service, acting.machine(), 1, ada.enrolment_id)
         # SQLite reuses the ids of the previous one.
         web.student("bob")
-        return accept(*asked, **options)
+        return accept(*arguments, **options)
 
     monkeypatch.setattr(intake, "accept_submission", accept_too_late)
     answer = submit(browser, f"/courses/1/mine/{echo().id}", files=_FILES)

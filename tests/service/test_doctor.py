@@ -29,8 +29,10 @@ from service.version import GRADER_VERSION
 
 
 def _queue(settings: Settings, store: Store) -> tuple[bool, str]:
-    found = {each.what: each for each in examine_service(settings.with_broker("redis://127.0.0.1:1/0"), store)}["queue"]
-    return found.well, found.sentence
+    finding = {each.what: each for each in examine_service(settings.with_broker("redis://127.0.0.1:1/0"), store)}[
+        "queue"
+    ]
+    return finding.well, finding.sentence
 
 
 @pytest.mark.parametrize(("minutes", "is_begun", "well"), [(1, False, True), (10, False, False), (10, True, True)])
@@ -45,8 +47,8 @@ def test_a_queue_that_stands_still_is_not_well(
         session.execute(update(Job).values(queued_at=now(session) - timedelta(minutes=minutes)))
     if is_begun:
         assert jobs.claim_job(store, "worker", 60) is not None
-    found, sentence = _queue(service_settings, store)
-    assert found is well
+    finding, sentence = _queue(service_settings, store)
+    assert finding is well
     assert ("start no jobs" in sentence) is not well
 
 
@@ -84,10 +86,10 @@ def test_the_advice_fits_the_direction(
         session.execute(text("UPDATE alembic_version SET version_num = :revision"), {"revision": revision})
         session.execute(update(SchemaCompatibility).values(oldest_compatible=oldest_compatible))
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
-    for found in (*examine_machine(service_settings), *of_service):
-        if found.what == "database":
-            assert found.well is (advice is None)
-            assert (advice or revision) in found.sentence
+    for each in (*examine_machine(service_settings), *of_service):
+        if each.what == "database":
+            assert each.well is (advice is None)
+            assert (advice or revision) in each.sentence
 
 
 @pytest.mark.parametrize(
@@ -118,9 +120,9 @@ def test_the_time_left_is_longer_while_others_wait(store: Store) -> None:
 
     def left() -> float:
         with store.reading() as session:
-            found = metrics.estimate_pace(session, ours.id)
-        assert found is not None
-        return found.left.total_seconds()
+            pace = metrics.estimate_pace(session, ours.id)
+        assert pace is not None
+        return pace.left.total_seconds()
 
     alone = left()
     other = accept_batch(store, "other", [grading_request(name) for name in ("eve", "fay", "gus")], [], max_attempts=3)
@@ -143,14 +145,14 @@ def test_a_full_disk_is_named(
 
     monkeypatch.setattr(doctor, "load_schema_state", fail)
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
-    (found,) = [each for each in of_service if each.what == "database"]
-    assert not found.well
-    assert found.sentence == ("the disk is full" if "full" in message else "no connection to the database")
+    (finding,) = [each for each in of_service if each.what == "database"]
+    assert not finding.well
+    assert finding.sentence == ("the disk is full" if "full" in message else "no connection to the database")
 
 
 def test_the_clock_of_a_file_is_not_compared_with_itself(service_settings: Settings, store: Store) -> None:
-    (found,) = [each for each in examine_machine(service_settings) if each.what == "clock"]
-    assert ("a local file" in found.sentence) is (store.engine.dialect.name == "sqlite")
+    (finding,) = [each for each in examine_machine(service_settings) if each.what == "clock"]
+    assert ("a local file" in finding.sentence) is (store.engine.dialect.name == "sqlite")
 
 
 def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> None:
@@ -188,10 +190,10 @@ def test_workers_that_must_be_restarted_are_named(
         workers.record_heartbeat(store, WorkerDescription(f"worker-{number}", "host", 1, "0", "all of it", problem))
     of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
     (ready,) = [each for each in of_service if each.what == "workers"]
-    (here,) = [each for each in examine_machine(service_settings) if each.what == "workers"]
-    assert (ready.well, here.well) == (well, not any(problems))
-    for found in (ready, here):
-        assert ("restart it" in found.sentence) is any(problems)
+    (machine_finding,) = [each for each in examine_machine(service_settings) if each.what == "workers"]
+    assert (ready.well, machine_finding.well) == (well, not any(problems))
+    for finding in (ready, machine_finding):
+        assert ("restart it" in finding.sentence) is any(problems)
     assert "worker-" not in ready.sentence
 
 
@@ -200,8 +202,8 @@ def test_a_release_that_is_exchanged_in_place_is_noticed(
 ) -> None:
     def ready() -> tuple[bool, str]:
         of_service = examine_service(service_settings.with_broker("redis://127.0.0.1:1/0"), store)
-        (found,) = [each for each in of_service if each.what == "release"]
-        return found.well, found.sentence
+        (finding,) = [each for each in of_service if each.what == "release"]
+        return finding.well, finding.sentence
 
     assert ready()[0]
     info = tmp_path / "site" / "robomark-99.dist-info"

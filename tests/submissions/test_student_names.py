@@ -251,8 +251,8 @@ def test_name_and_address_are_those_that_were_told_last(store: Store) -> None:
         at = now(session)
         students = Students(session, ensure_course(session, "default", at))
         known = students.enrol(Student("s1"), at)
-        for told in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
-            assert students.enrol(told, at) == known
+        for each in (Student("s1", "Ada King", "ada@uni.example"), Student("s1", "Ada Lovelace"), Student("s1")):
+            assert students.enrol(each, at) == known
         row = session.scalars(select(Enrolment)).one()
         assert (row.name, row.email) == ("Ada Lovelace", "ada@uni.example")
 

@@ -37,11 +37,11 @@ def get(
 
 
 def test_what_is_answered_is_read_as_far_as_it_is_asked_for() -> None:
-    said = b"HTTP/1.1 200 OK\r\nLink: <x>\r\nContent-Length: 10\r\n\r\n0123456789"
+    response_bytes = b"HTTP/1.1 200 OK\r\nLink: <x>\r\nContent-Length: 10\r\n\r\n0123456789"
     for most, body in ((0, b""), (4, b"01234"), (10, b"0123456789")):
-        with answering(said) as url:
-            found = get(url, most_bytes=most)
-        assert (found.status, found.headers["link"], found.body) == (200, "<x>", body)
+        with answering(response_bytes) as url:
+            response = get(url, most_bytes=most)
+        assert (response.status, response.headers["link"], response.body) == (200, "<x>", body)
 
 
 def test_a_network_may_be_reached_that_is_named() -> None:
@@ -117,12 +117,12 @@ def test_a_name_inside_is_told_from_none_at_all_by_nobody(monkeypatch: pytest.Mo
         return [(2, 1, 6, "", ("10.0.0.1", 80))]
 
     monkeypatch.setattr(socket, "getaddrinfo", resolve)
-    told = set()
+    messages = set()
     for host in ("nowhere.example.org", "intranet.example.org"):
         with pytest.raises(RequestFailure) as error:
             get(f"http://{host}/", NO_NETWORKS)
-        told.add((type(error.value), str(error.value).replace(host, "")))
-    assert len(told) == 1
+        messages.add((type(error.value), str(error.value).replace(host, "")))
+    assert len(messages) == 1
 
 
 def test_who_answers_no_http_or_a_byte_at_a_time_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:

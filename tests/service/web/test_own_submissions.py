@@ -36,17 +36,17 @@ HOSTILE = "</textarea><script>alert(1)</script>"
 
 def _assignment(name: str) -> Assignment:
     """Return the echo assignment with a criterion and a scenario hidden from students, and a given file."""
-    asked = echo()
-    hidden = asked.criteria[0].model_copy(
+    assignment = echo()
+    hidden = assignment.criteria[0].model_copy(
         update={"id": "hidden", "title": "Secret criterion", "marks": Decimal(7), "visibility": "hidden"}
     )
-    secret = replace(asked.scenarios[0], id="secret-scenario", visibility="hidden")
+    secret = replace(assignment.scenarios[0], id="secret-scenario", visibility="hidden")
     return replace(
-        asked,
+        assignment,
         id=name,
         title=f"About {name}",
-        criteria=(*asked.criteria, hidden),
-        scenarios=(*asked.scenarios, secret),
+        criteria=(*assignment.criteria, hidden),
+        scenarios=(*assignment.scenarios, secret),
         given={"notes.txt": b"counts from 0"},
         given_parts={"key.py": "answer = 42"},
         secret="do not tell",
@@ -87,10 +87,10 @@ def _grade(web: Web, marks: str = "1") -> None:
 
 def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
-    shown = browser.get(MINE).text
-    assert "About open" in shown
-    assert "About prepared" not in shown
-    assert "About closed" not in shown
+    page_text = browser.get(MINE).text
+    assert "About open" in page_text
+    assert "About prepared" not in page_text
+    assert "About closed" not in page_text
     for name in ("prepared", "closed", "no-such", "submissions"):
         assert browser.get(f"{MINE}/{name}").status_code == 404
         assert _send(browser, path=f"{MINE}/{name}").status_code == 404
@@ -98,11 +98,11 @@ def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) 
 
 def test_a_task_tells_nothing_that_is_hidden_and_gives_what_is_given(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
-    shown = browser.get(f"{MINE}/open").text
-    assert "The responder echoes each message" in shown
-    assert "Marks for hidden criteria: 7" in shown
+    page_text = browser.get(f"{MINE}/open").text
+    assert "The responder echoes each message" in page_text
+    assert "Marks for hidden criteria: 7" in page_text
     for secret in ("Secret criterion", "secret-scenario", "do not tell", "key.py"):
-        assert secret not in shown
+        assert secret not in page_text
     given = browser.get(f"{MINE}/open/given/notes.txt")
     assert (given.content, given.headers["content-type"]) == (b"counts from 0", "application/octet-stream")
     assert given.headers["content-disposition"].startswith('attachment; filename="notes.txt"')
@@ -188,9 +188,9 @@ def test_a_german_page_refuses_in_german(
     sent = [("files", file) for file in files]
     answer = submit(browser, f"{MINE}/open", {"texts": texts}, files=sent or None, headers={"accept-language": "de"})
     assert answer.status_code == 422
-    (told,) = re.findall(r'<p class="refused" role="alert">(.*?)</p>', answer.text, re.DOTALL)
-    assert german in told
-    assert "expected" not in told
+    (page_text,) = re.findall(r'<p class="refused" role="alert">(.*?)</p>', answer.text, re.DOTALL)
+    assert german in page_text
+    assert "expected" not in page_text
 
 
 def test_a_part_that_is_missing_is_asked_for_once(web: Web, ada: Member) -> None:
@@ -228,14 +228,14 @@ def test_no_marks_are_shown_that_are_not_published_and_none_that_are_for_staff(w
     try:
         over = _send(browser, "print(2)").headers["location"]
         _grade(web, "4")
-        shown = browser.get(over).text
+        page_text = browser.get(over).text
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
-    assert "no attempts left" in shown
-    assert "Your current grade is still from attempt 1." in shown
-    assert "4 of 4 marks" not in shown
-    assert "division by zero" not in shown
+    assert "no attempts left" in page_text
+    assert "Your current grade is still from attempt 1." in page_text
+    assert "4 of 4 marks" not in page_text
+    assert "division by zero" not in page_text
     card = browser.get(MINE).text
     assert "4 of 4 marks" not in card
     assert re.search(r"<b>Current grade:</b> <a [^>]*>Attempt 1</a>: 2 of 8 marks", card)
@@ -247,10 +247,10 @@ def test_attempts_are_shown_with_how_the_marks_moved(web: Web, ada: Member) -> N
     for marks in ("1", "3"):
         last = _send(browser, f"print({marks})").headers["location"]
         _grade(web, marks)
-    shown = browser.get(last).text
-    assert '<polyline points="4.0,16.0 96.0,8.0 "/>' in shown
-    assert "1 of 4 marks" in shown
-    assert "3 of 4 marks" in shown
+    page_text = browser.get(last).text
+    assert '<polyline points="4.0,16.0 96.0,8.0 "/>' in page_text
+    assert "1 of 4 marks" in page_text
+    assert "3 of 4 marks" in page_text
     newer = _send(browser, "print(5)").headers["location"]
     _send(browser, "print(6)")
     assert "Replaced by a newer submission." in browser.get(newer).text
@@ -262,9 +262,9 @@ def test_the_attempt_that_counts_and_the_same_files_are_marked(web: Web, ada: Me
     for program, marks in (("print('high')", "3"), ("print('low')", "1"), ("print('high')", "3")):
         last = _send(browser, program).headers["location"]
         _grade(web, marks)
-    shown = browser.get(last).text
-    assert "same files as attempt 1; no attempt used" in shown
-    rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", shown.partition("<h2>Your attempts</h2>")[2], re.DOTALL)
+    page_text = browser.get(last).text
+    assert "same files as attempt 1; no attempt used" in page_text
+    rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", page_text.partition("<h2>Your attempts</h2>")[2], re.DOTALL)
     assert ["current grade</span>" in row for row in rows] == [True, False, False]
 
 
@@ -276,21 +276,21 @@ def test_a_limit_that_is_reached_is_named_and_invites_no_more(web: Web, ada: Mem
             policies.set_policy(session, 1, "open", PolicyLimits(due, late_days=1, attempts=1))
         late = _send(browser, "print('late')").headers["location"]
         _grade(web)
-        shown = browser.get(late).text
-        assert "9 hours late" in shown
-        assert "Submit again" not in shown
-        shown = browser.get(f"{MINE}/open").text
-        assert "You have used all your attempts" in shown
-        assert '<button class="second">Submit</button>' in shown
+        page_text = browser.get(late).text
+        assert "9 hours late" in page_text
+        assert "Submit again" not in page_text
+        page_text = browser.get(f"{MINE}/open").text
+        assert "You have used all your attempts" in page_text
+        assert '<button class="second">Submit</button>' in page_text
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits(due - timedelta(days=2), attempts=1))
         first = web.browser(web.student("comes too late"))
         assert "The last date for submissions has passed" in first.get(f"{MINE}/open").text
         over = _send(first, "print('too late')").headers["location"]
         _grade(web)
-        shown = first.get(over).text
-        assert "submitted after the last date" in shown
-        assert "is still from attempt" not in shown
+        page_text = first.get(over).text
+        assert "submitted after the last date" in page_text
+        assert "is still from attempt" not in page_text
     finally:
         with web.store.transaction() as session:
             policies.set_policy(session, 1, "open", PolicyLimits())
@@ -318,9 +318,9 @@ def test_what_failed_by_our_fault_says_so_and_tells_no_more(web: Web, ada: Membe
     with web.store.transaction() as session:
         dead = {"state": JobState.DEAD, "error": "the worker secret-host fell silent"}
         session.execute(update(Job).where(Job.enrolment_id == ada.enrolment_id).values(**dead))
-    shown = browser.get(mine).text
-    assert "Failed; this is not your fault." in shown
-    assert "secret-host" not in shown
+    page_text = browser.get(mine).text
+    assert "Failed; this is not your fault." in page_text
+    assert "secret-host" not in page_text
 
 
 def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member) -> None:

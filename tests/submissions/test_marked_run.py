@@ -31,10 +31,10 @@ def submitted(folder: Path, cells: Sequence[str], run: str | None = None) -> Sub
 
 
 def chosen(submission: Submission, responder: str = "student", cell: str = "last") -> RunChoice:
-    found = find_assignment("shape-recognition")
-    asked = replace(found, parts=replace(found.parts, responder=responder, cell=cell))
+    graded_assignment = find_assignment("shape-recognition")
+    assignment = replace(graded_assignment, parts=replace(graded_assignment.parts, responder=responder, cell=cell))
     assert submission.notebook is not None
-    return choose_run(submission.notebook, asked, submission.run)
+    return choose_run(submission.notebook, assignment, submission.run)
 
 
 @pytest.mark.parametrize(
@@ -92,9 +92,9 @@ def test_what_the_assignment_names_wins(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("run", ["0", "3", "nobody", "9" * 5000])
 def test_a_run_that_is_not_there_is_refused(tmp_path: Path, run: str) -> None:
-    asked = find_assignment("shape-recognition").parts
+    assignment = find_assignment("shape-recognition").parts
     with pytest.raises(UsageError, match=r"ada\.ipynb: has no (run|cell)") as caught:
-        fit_parts(submitted(tmp_path, [ANSWER, LOOP, SHAPES], run), asked)
+        fit_parts(submitted(tmp_path, [ANSWER, LOOP, SHAPES], run), assignment)
     assert len(str(caught.value)) < 300
 
 

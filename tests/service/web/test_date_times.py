@@ -42,7 +42,7 @@ def test_a_moment_says_its_zone(server_in: pytest.MonkeyPatch, zone: str, summer
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("zone", "shown"),
+    ("zone", "displayed_text"),
     [
         ("UTC", "2026-07-01 22:00 UTC"),
         ("Asia/Kolkata", "2026-07-02 03:30 UTC+5:30"),
@@ -50,7 +50,7 @@ def test_a_moment_says_its_zone(server_in: pytest.MonkeyPatch, zone: str, summer
     ],
 )
 def test_a_browser_shows_a_moment_in_the_zone_of_its_reader(
-    server_in: pytest.MonkeyPatch, zone: str, shown: str
+    server_in: pytest.MonkeyPatch, zone: str, displayed_text: str
 ) -> None:
     server_in.setenv("TZ", "UTC")
     time.tzset()
@@ -59,5 +59,5 @@ def test_a_browser_shows_a_moment_in_the_zone_of_its_reader(
         page = browser.new_context(timezone_id=zone).new_page()
         page.set_content(f"<p>{moment}</p>")
         page.add_script_tag(path=ROOT / "service/web/static/robomark.js")
-        assert page.inner_text("p") == shown
-        assert (page.get_attribute("time", "title") or shown) == "2026-07-01 22:00 UTC"
+        assert page.inner_text("p") == displayed_text
+        assert (page.get_attribute("time", "title") or displayed_text) == "2026-07-01 22:00 UTC"

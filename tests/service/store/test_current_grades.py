@@ -52,22 +52,22 @@ def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
 
 def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
     """Return the job of Ada's current attempt for each reader; None where there is none."""
-    found: dict[str, str | None] = {}
+    current_jobs: dict[str, str | None] = {}
     with store.reading() as session:
         enrolment_id = session.scalars(select(Enrolment.id)).one()
         of_all = own_submissions.load_own_assignments(session, 1, enrolment_id)
-        found["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
+        current_jobs["own list"] = None if of_all[0].counting is None else of_all[0].counting.job_id
         own = own_submissions.load_own_attempts(session, enrolment_id, "echo-responder").counting
-        found["own page"] = None if own is None else own.job_id
+        current_jobs["own page"] = None if own is None else own.job_id
         lines = {"course": job_lines.load_course_lines(session, 1, ["echo-responder"])}
         if batch_id is not None:
             lines["batch"] = job_lines.load_job_lines(session, batch_id)
             lines["some of a batch"] = job_lines.load_job_lines_page(session, batch_id, NOBODY, 10)
             (row,) = batch_table.load_table_lines(session, batch_id, (), NOBODY)
-            found["table"] = row.id if row.marks is not None and not row.staff_only else None
+            current_jobs["table"] = row.id if row.marks is not None and not row.staff_only else None
         for name, (line,) in lines.items():
-            found[name] = line.id if line.marks is not None and not line.staff_only else None
-    return found
+            current_jobs[name] = line.id if line.marks is not None and not line.staff_only else None
+    return current_jobs
 
 
 @pytest.mark.parametrize("how", ["dead", "waiting", "running"])
@@ -149,11 +149,11 @@ def test_predicates_and_expressions_say_the_same_of_every_outcome(store: Store) 
             session.execute(update(SubmissionRow).values(staff_only=staff_only))
         with store.reading() as session:
             line = job_lines.load_job_line(session, job_id)
-            asked = [select(Job.id).join(SubmissionRow).where(*which) for which in pairs.values()]
-            found = [session.scalar(query) is not None for query in asked]
+            queries = [select(Job.id).join(SubmissionRow).where(*which) for which in pairs.values()]
+            results = [session.scalar(query) is not None for query in queries]
             query = select(Job.id).join(SubmissionRow).where(*current_grades.CAN_COUNT)
             counted = session.scalar(query) is not None
-        assert [is_so(line) for is_so in pairs] == found, line
+        assert [is_so(line) for is_so in pairs] == results, line
         assert (describe_missing_grade(line) == "") == current_grades.is_for_students(line), line
         counts = state is JobState.DONE and standing is Standing.STANDS and suspect is None and staff_only is None
         assert counted == counts, line

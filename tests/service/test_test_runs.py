@@ -37,18 +37,18 @@ def runner() -> Iterator[TrialRunner]:
         yield made
 
 
-def _with_hidden(asked: Assignment) -> Assignment:
-    hidden = replace(asked.scenarios[0], id=HIDDEN, visibility="hidden")
-    return replace(asked, scenarios=(hidden, *asked.scenarios), secret="do not tell")
+def _with_hidden(assignment: Assignment) -> Assignment:
+    hidden = replace(assignment.scenarios[0], id=HIDDEN, visibility="hidden")
+    return replace(assignment, scenarios=(hidden, *assignment.scenarios), secret="do not tell")
 
 
 def _tried(
-    store: Store, runner: TrialRunner, program: str, asked: Assignment | None = None, *, alone: bool = False
+    store: Store, runner: TrialRunner, program: str, assignment: Assignment | None = None, *, alone: bool = False
 ) -> StudentTestRun:
     """Return the student's view of a test run after a worker was notified; with ``alone``, without a responder."""
     submission = grading_request("ada", program).submission
     packed = pack_submission(replace(submission, responder=None) if alone else submission)
-    frozen = freeze_assignment(asked or _with_hidden(echo()))
+    frozen = freeze_assignment(assignment or _with_hidden(echo()))
     with store.transaction() as session:
         at = now(session)
         ada = Students(session, ensure_course(session, "default", at)).enrol(Student("ada"), at)
@@ -73,15 +73,17 @@ def test_nothing_of_the_trial_is_secret() -> None:
 
 
 def test_it_is_one_short_trial_of_many() -> None:
-    asked = find_assignment("shape-recognition")
-    assert len(list(asked.trials())) > 1
-    once = build_single_trial_assignment(replace(asked, limits=Limits(program_cpu=60, responder_cpu=60, all_cpu=600)))
+    assignment = find_assignment("shape-recognition")
+    assert len(list(assignment.trials())) > 1
+    once = build_single_trial_assignment(
+        replace(assignment, limits=Limits(program_cpu=60, responder_cpu=60, all_cpu=600))
+    )
     assert once is not None
     (trial,) = once.trials()
-    assert trial.pose == asked.scenarios[0].poses[0]
+    assert trial.pose == assignment.scenarios[0].poses[0]
     assert trial.scenario.seconds <= MAX_SECONDS
     assert (once.limits.program_cpu, once.limits.all_cpu) < (5, 20)
-    small = build_single_trial_assignment(replace(asked, limits=Limits(program_cpu=0.5)))
+    small = build_single_trial_assignment(replace(assignment, limits=Limits(program_cpu=0.5)))
     assert small is not None
     assert small.limits.program_cpu == 0.5
 
@@ -114,11 +116,11 @@ def test_endless_output_and_endless_loops_end(store: Store, runner: TrialRunner)
 
 def test_of_a_part_that_is_not_there_no_marks_are_spoken(store: Store, runner: TrialRunner) -> None:
     line = _tried(store, runner, "import time\nprint('PY::1')\ntime.sleep(1)\n", echo(), alone=True)
-    told = json.dumps(line.words)
+    output = json.dumps(line.words)
     assert "There is no responder.py, so only the other part was run." in line.words["notes"]
-    assert "graded" not in told
-    assert "marks" not in told
-    assert "(answer of the simulator) pingpong PY::1" in told
+    assert "graded" not in output
+    assert "marks" not in output
+    assert "(answer of the simulator) pingpong PY::1" in output
 
 
 def test_a_fault_of_ours_is_no_verdict(store: Store, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from service.reports.display_text import abbreviate_message, format_decimal, to_
 
 
 @pytest.mark.parametrize(
-    ("text", "shown"),
+    ("text", "displayed_text"),
     [
         ("plain, é, 日本, 👩‍🚀", "plain, é, 日本, 👩‍🚀"),
         ("\x1b[31mred", "\\x1b[31mred"),
@@ -21,9 +21,9 @@ from service.reports.display_text import abbreviate_message, format_decimal, to_
         ("noncharacter \U0001ffff", "noncharacter \\U0001ffff"),
     ],
 )
-def test_invisible_characters_are_spelled_out(text: str, shown: str) -> None:
-    assert to_display_text(text) == shown
-    assert to_display_text(to_display_text(text)) == shown
+def test_invisible_characters_are_spelled_out(text: str, displayed_text: str) -> None:
+    assert to_display_text(text) == displayed_text
+    assert to_display_text(to_display_text(text)) == displayed_text
 
 
 def test_long_text_is_cut_and_says_by_how_much() -> None:
@@ -47,8 +47,8 @@ def test_a_image_message_is_named_not_listed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("marks", "shown"),
+    ("marks", "displayed_text"),
     [("4.00", "4"), ("2.50", "2.5"), ("0E+1", "0"), ("100", "100"), ("0", "0"), ("0E-400000000", "0")],
 )
-def test_marks_as_people_write_them(marks: str, shown: str) -> None:
-    assert format_decimal(Decimal(marks)) == shown
+def test_marks_as_people_write_them(marks: str, displayed_text: str) -> None:
+    assert format_decimal(Decimal(marks)) == displayed_text

@@ -260,15 +260,15 @@ def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner:
 
 
 def test_a_grade_has_what_its_trials_cost_and_is_compared_without(runner: TrialRunner) -> None:
-    asked = find_assignment("echo-responder")
+    assignment = find_assignment("echo-responder")
     program = SourceFile("robot.py", f"{NAP}print('PY::x')\n")
     submission = Submission("ada", program, SourceFile("responder.py", ECHO))
-    first, second = (grade(submission, asked, runner=runner) for _ in range(2))
+    first, second = (grade(submission, assignment, runner=runner) for _ in range(2))
     cost = first.cost
     assert cost is not None
     assert cost.spent is not None
-    assert cost.limits.cpu_seconds == asked.limits.compute_total_cpu(len(first.trials))
-    assert cost.limits.sleep_seconds == asked.limits.all_sleep
+    assert cost.limits.cpu_seconds == assignment.limits.compute_total_cpu(len(first.trials))
+    assert cost.limits.sleep_seconds == assignment.limits.all_sleep
     # The sleep, minus the free half second of each process.
     assert 0.3 * len(first.trials) < cost.spent.sleep_seconds < cost.limits.sleep_seconds
     assert 0 < cost.spent.cpu_seconds < cost.limits.cpu_seconds

@@ -47,9 +47,9 @@ def _graded(runner: TrialRunner) -> tuple[GradingRequest, Grade]:
     return request, grade(request.submission, request.assignment, runner=runner)
 
 
-def _cut(trial: TrialResult, *said: str) -> TrialResult:
+def _cut(trial: TrialResult, *messages: str) -> TrialResult:
     """Return the trial as if a limit had ended it after this speech."""
-    spoken = tuple(TimedText(0.0, text) for text in said)
+    spoken = tuple(TimedText(0.0, text) for text in messages)
     recording = replace(trial.recording, sha256="0" * 64, verdict=Verdict.CPU_LIMIT, spoken=spoken, faults=())
     return replace(trial, recording=recording)
 

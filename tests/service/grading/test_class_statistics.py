@@ -19,17 +19,17 @@ def _marked(who: str, *marks: int, verdict: str = "finished", assignment: str = 
 
 
 def test_a_class_of_four() -> None:
-    (found,) = compute_statistics(
+    (statistics,) = compute_statistics(
         [_marked("dan", 4, 4), _marked("bob", 4, 0), _marked("ada", 2, 0), _marked("cyd", 0, 0, verdict="cpu_limit")]
     )
-    assert (found.n, found.max_marks, found.mean) == (4, 8, 3.5)
-    assert (found.lowest, found.median, found.highest) == (0, 3, 8)
-    assert found.spread == pytest.approx(3.4157, abs=1e-4)
-    assert [(each.title, each.n, each.mean_share) for each in found.criteria] == [
+    assert (statistics.n, statistics.max_marks, statistics.mean) == (4, 8, 3.5)
+    assert (statistics.lowest, statistics.median, statistics.highest) == (0, 3, 8)
+    assert statistics.spread == pytest.approx(3.4157, abs=1e-4)
+    assert [(each.title, each.n, each.mean_share) for each in statistics.criteria] == [
         ("Does a", 4, 0.625),
         ("Does b", 4, 0.25),
     ]
-    assert [(cause.sentence, cause.students) for cause in found.causes] == [
+    assert [(cause.sentence, cause.students) for cause in statistics.causes] == [
         ("lost marks for: Does b", ("ada", "bob")),
         ("computed for too long", ("cyd",)),
         ("lost marks for: Does a", ("ada",)),
@@ -37,20 +37,20 @@ def test_a_class_of_four() -> None:
 
 
 def test_each_assignment_by_itself_and_nothing_of_none() -> None:
-    found = compute_statistics([_marked("ada", 4, assignment="walk"), _marked("ada", 2, assignment="echo")])
-    assert [(each.assignment, each.mean, each.spread) for each in found] == [("echo", 2, None), ("walk", 4, None)]
-    assert found[1].causes == ()
+    statistics = compute_statistics([_marked("ada", 4, assignment="walk"), _marked("ada", 2, assignment="echo")])
+    assert [(each.assignment, each.mean, each.spread) for each in statistics] == [("echo", 2, None), ("walk", 4, None)]
+    assert statistics[1].causes == ()
     assert compute_statistics([]) == ()
 
 
 def test_a_fault_that_cost_no_marks_is_no_cause() -> None:
-    (found,) = compute_statistics([_marked("ada", 4, 4, verdict="time_limit")])
-    assert found.causes == ()
+    (statistics,) = compute_statistics([_marked("ada", 4, 4, verdict="time_limit")])
+    assert statistics.causes == ()
 
 
 def test_who_was_still_running_at_the_end_lost_marks_for_criteria_too() -> None:
-    (found,) = compute_statistics([_marked("ada", 4, 0, verdict="time_limit")])
-    assert [(cause.sentence, cause.criterion) for cause in found.causes] == [
+    (statistics,) = compute_statistics([_marked("ada", 4, 0, verdict="time_limit")])
+    assert [(cause.sentence, cause.criterion) for cause in statistics.causes] == [
         ("lost marks for: Does b", "Does b"),
         ("still running at the end", ""),
     ]

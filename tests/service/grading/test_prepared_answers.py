@@ -104,11 +104,11 @@ def grading_request(program: str, table: Mapping[str, Mapping[str, str]], name: 
 
 def marked(name: str) -> Assignment:
     """Return the assignment with only its hidden scenarios and their marked criteria."""
-    asked = find_assignment(name)
-    hidden = [scenario for scenario in asked.scenarios if scenario.visibility == "hidden"]
+    assignment = find_assignment(name)
+    hidden = [scenario for scenario in assignment.scenarios if scenario.visibility == "hidden"]
     ids = {scenario.id for scenario in hidden}
-    wanted = [each for each in asked.criteria if set(each.scenarios) & ids and each.marks]
-    return replace(asked, scenarios=tuple(hidden), criteria=tuple(wanted))
+    wanted = [each for each in assignment.criteria if set(each.scenarios) & ids and each.marks]
+    return replace(assignment, scenarios=tuple(hidden), criteria=tuple(wanted))
 
 
 def looked_up(graded: Grade) -> Iterator[tuple[dict[str, str], str | None]]:
@@ -144,26 +144,29 @@ _LONG = [name if name == _QUICK else pytest.param(name, marks=pytest.mark.long) 
 
 @pytest.mark.parametrize("name", _LONG)
 def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> None:
-    asked, program = marked(name), ATTACKED[name]
-    offered = sum(criterion.marks for criterion in asked.criteria)
+    assignment, program = marked(name), ATTACKED[name]
+    offered = sum(criterion.marks for criterion in assignment.criteria)
     assert offered >= 8
-    at_home = [grade(grading_request(program, {}, "spy"), asked, secret=home, runner=runner) for home in HOMES]
+    at_home = [grade(grading_request(program, {}, "spy"), assignment, secret=home, runner=runner) for home in HOMES]
     table = table_of(at_home)
     assert len(table["image"]) >= 20
 
     # In the original world, images reveal everything. Random numbers would too, if they did not depend on the
     # submission.
     seen = grading_request(program, {"image": table["image"]}, "table of images")
-    assert grade(seen, asked, secret=HOMES[1], runner=runner).marks == offered
+    assert grade(seen, assignment, secret=HOMES[1], runner=runner).marks == offered
     chances = {kind: entries for kind, entries in table.items() if kind != "image" and "place" not in kind}
     chances.pop("its step", None)
     assert len(chances) == 13
     by_chance = grading_request(program, chances, "table of chance")
-    assert grade(by_chance, asked, secret=HOMES[1], runner=runner).marks == 0
+    assert grade(by_chance, assignment, secret=HOMES[1], runner=runner).marks == 0
 
     # In the marked world, no image and no random number occurs again.
     everything = grade(
-        grading_request(program, {**chances, "image": table["image"]}, "both"), asked, secret=MARKING, runner=runner
+        grading_request(program, {**chances, "image": table["image"]}, "both"),
+        assignment,
+        secret=MARKING,
+        runner=runner,
     )
     hits = [kind for keys, _ in looked_up(everything) for kind, key in keys.items() if key in table[kind]]
     assert {kind for kind in hits if "place" not in kind and kind != "its step"} == set()
@@ -171,7 +174,7 @@ def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> N
     # A position predicts no more than a guess does.
     places = {kind: entries for kind, entries in table.items() if kind in ("its place", "its step")}
     assert (
-        grade(grading_request(program, places, "table of places"), asked, secret=MARKING, runner=runner).marks
+        grade(grading_request(program, places, "table of places"), assignment, secret=MARKING, runner=runner).marks
         <= offered / 3
     )
 
@@ -192,18 +195,18 @@ def train(images, labels):
 
 @pytest.mark.long
 def test_a_table_made_at_home_is_no_model(runner: TrialRunner) -> None:
-    asked = find_assignment("train-a-recogniser")
-    marking = tuple(criterion for criterion in asked.criteria if criterion.marks)
+    assignment = find_assignment("train-a-recogniser")
+    marking = tuple(criterion for criterion in assignment.criteria if criterion.marks)
     # Nothing is learnt from the collected data.
-    collected, _, *hidden = asked.scenarios
-    asked = replace(asked, criteria=marking, scenarios=(replace(collected, trials=1), *hidden))
+    collected, _, *hidden = assignment.scenarios
+    assignment = replace(assignment, criteria=marking, scenarios=(replace(collected, trials=1), *hidden))
     table = {}
-    for trial in grade(_model({}), asked, secret=HOMES[1], runner=runner).trials:
+    for trial in grade(_model({}), assignment, secret=HOMES[1], runner=runner).trials:
         for image in trial.recording.images:
             row = convert_to_grey(image, focus=True).astype(float).ravel()
             table[str(np.round(row / max(1.0, row.max()) * 255).astype(int).tolist())] = str(image.truth)
-    assert grade(_model(table), asked, secret=HOMES[1], runner=runner).marks == asked.max_marks
-    assert grade(_model(table), asked, secret=MARKING, runner=runner).marks == 0
+    assert grade(_model(table), assignment, secret=HOMES[1], runner=runner).marks == assignment.max_marks
+    assert grade(_model(table), assignment, secret=MARKING, runner=runner).marks == 0
 
 
 def _model(table: Mapping[str, str]) -> Submission:
@@ -219,7 +222,7 @@ print("NUMBER", os.getpid())
 ECHO = "import random\ndef responder(text): return str(random.random())\n"
 
 
-def _said(graded: Grade) -> list[Any]:
+def _collect_speech(graded: Grade) -> list[Any]:
     return [[message.text for message in trial.recording.messages] for trial in graded.trials]
 
 
@@ -234,9 +237,9 @@ def _numbers(graded: Grade) -> list[int]:
 
 @pytest.fixture(scope="module")
 def noisy() -> Assignment:
-    asked = find_assignment("shape-at-random")
-    few = tuple(replace(scenario, trials=5) for scenario in asked.scenarios)
-    return replace(asked, criteria=asked.criteria[:1], scenarios=few)
+    assignment = find_assignment("shape-at-random")
+    few = tuple(replace(scenario, trials=5) for scenario in assignment.scenarios)
+    return replace(assignment, criteria=assignment.criteria[:1], scenarios=few)
 
 
 def submission(comment: str) -> Submission:
@@ -248,23 +251,23 @@ def test_chance_and_the_order_of_trials_are_each_submissions_own(noisy: Assignme
         one, other = (grade(submission(text), noisy, secret=MARKING, runner=runner) for text in ("one", "other"))
     assert [trial.seed for trial in one.trials] == [trial.seed for trial in other.trials]
     assert _numbers(one) != _numbers(other)
-    shown = len([trial for trial in one.trials if trial.visibility == "visible"])
+    visible_count = len([trial for trial in one.trials if trial.visibility == "visible"])
     for order in (_numbers(one), _numbers(other)):
-        assert sorted(order[:shown]) == list(range(shown)) != order[:shown]
-        assert sorted(order[shown:]) == list(range(shown, len(one.trials))) != order[shown:]
-    spoken = {text for graded in (one, other) for texts in _said(graded) for text in texts}
-    assert len(spoken) == 2 * len(_said(one)) * len(_said(one)[0])
+        assert sorted(order[:visible_count]) == list(range(visible_count)) != order[:visible_count]
+        assert sorted(order[visible_count:]) == list(range(visible_count, len(one.trials))) != order[visible_count:]
+    spoken = {text for graded in (one, other) for texts in _collect_speech(graded) for text in texts}
+    assert len(spoken) == 2 * len(_collect_speech(one)) * len(_collect_speech(one)[0])
 
 
 def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRunner, noisy: Assignment) -> None:
-    asked = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
+    assignment = replace(noisy, scenarios=(replace(noisy.scenarios[0], trials=3),))
     quiet = Submission(
         "s", SourceFile("robot.py", SHOWS.replace('print("NUMBER", os.getpid())', "")), SourceFile("responder.py", ECHO)
     )
     chains = [
         [
             trial.recording.sha256
-            for trial in grade(replace(quiet, student=who), asked, secret=secret, runner=runner).trials
+            for trial in grade(replace(quiet, student=who), assignment, secret=secret, runner=runner).trials
         ]
         for who, secret in (("ada", MARKING), ("bob", MARKING), ("ada", HOMES[1]))
     ]
@@ -273,8 +276,10 @@ def test_the_same_submission_and_secret_give_the_same_recordings(runner: TrialRu
 
 def test_a_table_of_truths_follows_the_order_in_which_the_secret_shuffles(runner: TrialRunner) -> None:
     """Judging uses the start place of the real run, whatever the secret is."""
-    asked = find_assignment("black-or-grey")
-    shuffled = replace(asked, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in asked.scenarios))
+    assignment = find_assignment("black-or-grey")
+    shuffled = replace(
+        assignment, scenarios=tuple(replace(scenario, choose="shuffled") for scenario in assignment.scenarios)
+    )
     program = (locate_examples("black-or-grey") / "reference" / "robot.py").read_text()
     reference = Submission("s", SourceFile("robot.py", program))
     orders = set()

@@ -36,9 +36,9 @@ def _ask(store: Store, enrolment_id: int) -> str:
 
 def _line(store: Store, enrolment_id: int, tryout_id: str) -> StudentTestRun:
     with store.reading() as session:
-        found = test_runs.find_student_run(session, enrolment_id, tryout_id)
-    assert found is not None
-    return found
+        student_run = test_runs.find_student_run(session, enrolment_id, tryout_id)
+    assert student_run is not None
+    return student_run
 
 
 def _pass(store: Store, seconds: float) -> None:

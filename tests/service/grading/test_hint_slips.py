@@ -42,8 +42,8 @@ def _cells(file: Path) -> Iterator[tuple[str, str]]:
 
 
 def test_there_is_no_slip_in_programs_that_are_right() -> None:
-    found = {name: slips for name, text in sources() if (slips := list(collect_slips(listing(text, name))))}
-    assert found == {}
+    slips_by_name = {name: slips for name, text in sources() if (slips := list(collect_slips(listing(text, name))))}
+    assert slips_by_name == {}
 
 
 @pytest.mark.parametrize(
@@ -82,9 +82,9 @@ def test_there_is_no_slip_in_programs_that_are_right() -> None:
     ],
 )
 def test_a_slip_is_found_with_its_fix(line: str, words: str) -> None:
-    found = list(collect_slips(listing(line)))
-    assert len(found) == 1
-    assert words in found[0]
+    slips = list(collect_slips(listing(line)))
+    assert len(slips) == 1
+    assert words in slips[0]
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_no_slip_is_seen_in_what_is_right(line: str) -> None:
 def effects(text: str) -> list[str]:
     """Return the statements of a text that are reported to have no effect."""
     code = listing(text).code
-    return [found for each in code.statements if (found := describe_discarded_value(each, code))]
+    return [discarded_value for each in code.statements if (discarded_value := describe_discarded_value(each, code))]
 
 
 @pytest.mark.parametrize(

@@ -44,13 +44,13 @@ def hinted(*hints: str, criteria: tuple[CriterionResult, ...] = ()) -> Grade:
 
 
 def test_a_hint_is_the_cause_and_its_line_the_excerpt_and_the_next_step() -> None:
-    told = diagnose(hinted(HINT, "another thing"), build.faulty_submission())
-    assert told.cause == f"Line 2 of responder.py: {ERROR}. Did you mean parser?"
-    assert told.next_step.startswith("Fix line 2 of responder.py")
-    assert told.further == ("Another thing.",)
-    assert told.excerpt is not None
-    assert told.excerpt.name == "responder.py"
-    assert [line.number for line in told.excerpt.lines if line.marked] == [2]
+    diagnosis = diagnose(hinted(HINT, "another thing"), build.faulty_submission())
+    assert diagnosis.cause == f"Line 2 of responder.py: {ERROR}. Did you mean parser?"
+    assert diagnosis.next_step.startswith("Fix line 2 of responder.py")
+    assert diagnosis.further == ("Another thing.",)
+    assert diagnosis.excerpt is not None
+    assert diagnosis.excerpt.name == "responder.py"
+    assert [line.number for line in diagnosis.excerpt.lines if line.marked] == [2]
     assert diagnose(hinted(HINT)).excerpt is None
 
 
@@ -70,8 +70,8 @@ def test_what_comes_after_an_error_where_it_came_is_lost_through_it(
     evidence: tuple[Evidence, ...], is_lost: bool
 ) -> None:
     whole = criterion("whole", marks=2)
-    told = diagnose(hinted(HINT, criteria=(whole, criterion("asked", *evidence))))
-    assert told.lost == (frozenset({1}) if is_lost else frozenset())
+    rule = diagnose(hinted(HINT, criteria=(whole, criterion("asked", *evidence))))
+    assert rule.lost == (frozenset({1}) if is_lost else frozenset())
 
 
 def test_a_text_that_is_nearly_right_costs_only_what_asks_for_it() -> None:
@@ -89,9 +89,9 @@ def test_a_message_that_was_never_one_costs_what_has_no_marks_at_all() -> None:
 
 
 def test_without_a_hint_the_first_error_is_the_cause() -> None:
-    told = diagnose(build.faulty_grade(), build.faulty_submission())
-    assert told.cause.startswith(f"Responder (responder.py), line 2: {ERROR}.")
-    assert told.excerpt is not None
+    diagnosis = diagnose(build.faulty_grade(), build.faulty_submission())
+    assert diagnosis.cause.startswith(f"Responder (responder.py), line 2: {ERROR}.")
+    assert diagnosis.excerpt is not None
 
 
 def test_time_that_was_up_is_the_cause_only_where_it_cost_marks() -> None:
@@ -119,10 +119,10 @@ def test_a_missing_part_comes_before_the_time_that_was_up_for_want_of_it() -> No
             criterion("names", missed(0, None), message="There is no responder.py."),
         ),
     )
-    told = diagnose(graded)
-    assert told.cause.startswith("There is no responder.py")
-    assert told.next_step.startswith("Submit responder.py")
-    assert told.lost == {1}
+    diagnosis = diagnose(graded)
+    assert diagnosis.cause.startswith("There is no responder.py")
+    assert diagnosis.next_step.startswith("Submit responder.py")
+    assert diagnosis.lost == {1}
 
 
 def test_the_dearest_criterion_is_the_cause_with_those_that_failed_where_it_did() -> None:
@@ -149,27 +149,28 @@ def test_what_was_set_by_hand_is_no_cause_and_keeps_its_words() -> None:
 def test_the_same_confusions_are_the_same_cause() -> None:
     grade = build.shape_grade()
     first = grade.criteria[0]
-    told = diagnose(replace(grade, criteria=(first, replace(first, id="again"), grade.criteria[1])))
+    diagnosis = diagnose(replace(grade, criteria=(first, replace(first, id="again"), grade.criteria[1])))
     assert (
-        told.cause == "5 of 6 images were identified correctly: “upwards facing triangle” was identified as “diamond”."
+        diagnosis.cause
+        == "5 of 6 images were identified correctly: “upwards facing triangle” was identified as “diamond”."
     )
-    assert told.lost == {0, 1}
+    assert diagnosis.lost == {0, 1}
 
 
 @pytest.mark.parametrize("verdict", [Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR])
 def test_what_is_ours_is_told_before_any_hint(verdict: Verdict) -> None:
     grade = hinted(HINT)
     broken = replace(grade.trials[0], recording=replace(grade.trials[0].recording, verdict=verdict))
-    told = diagnose(replace(grade, trials=(broken,)))
-    assert told.next_step == describe_verdict(verdict).next_step
-    assert told.lost == frozenset()
+    diagnosis = diagnose(replace(grade, trials=(broken,)))
+    assert diagnosis.next_step == describe_verdict(verdict).next_step
+    assert diagnosis.lost == frozenset()
 
 
 def test_full_marks_have_no_cause() -> None:
     grade = build.shape_grade()
     full = replace(grade, criteria=tuple(replace(each, marks=each.max_marks) for each in grade.criteria))
-    told = diagnose(full)
-    assert (told.cause, told.lost, told.excerpt) == (FULL_MARKS, frozenset(), None)
+    diagnosis = diagnose(full)
+    assert (diagnosis.cause, diagnosis.lost, diagnosis.excerpt) == (FULL_MARKS, frozenset(), None)
 
 
 def _on_a_terminal(grade: Grade) -> str:
@@ -192,12 +193,12 @@ WRITERS: dict[str, Callable[[Grade], str]] = {
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format_tells_cause_lines_and_next_step_in_this_order(name: str) -> None:
     grade = hinted(HINT)
-    told = diagnose(grade, build.faulty_submission())
-    assert told.excerpt is not None
-    (line,) = (each.text.strip() for each in told.excerpt.lines if each.marked)
+    diagnosis = diagnose(grade, build.faulty_submission())
+    assert diagnosis.excerpt is not None
+    (line,) = (each.text.strip() for each in diagnosis.excerpt.lines if each.marked)
     text = " ".join(WRITERS[name](grade).split())
-    assert text.count(told.cause) == 1 + (name == "junit")  # junit contains the hints as well
-    after = [text.index(each) for each in (told.cause, told.next_step)]
+    assert text.count(diagnosis.cause) == 1 + (name == "junit")  # junit contains the hints as well
+    after = [text.index(each) for each in (diagnosis.cause, diagnosis.next_step)]
     assert after == sorted(after)
     assert line in text
     if name != "gradescope":
@@ -223,5 +224,5 @@ def test_what_was_lost_through_the_cause_has_one_line_and_the_others_their_own_w
 
 
 def test_a_student_reads_no_cause_of_hidden_trials() -> None:
-    told = diagnose(build_student_view(build.hidden_grade()).grade)
-    assert "SECRET" not in told.cause + told.next_step
+    diagnosis = diagnose(build_student_view(build.hidden_grade()).grade)
+    assert "SECRET" not in diagnosis.cause + diagnosis.next_step

@@ -94,8 +94,8 @@ def test_an_instructors_link_reaches_one_course_and_one_role(web: Web, grace: Te
         assert signed_in.get("/courses/2/mine").status_code == 404
         assert signed_in.get("/courses/3/people").status_code == 404
         assert signed_in.get("/operator").status_code == 404
-    told = web.browser().get("/api/v1/me", headers=token).json()
-    assert ([course["id"] for course in told["courses"]], told["operator"]) == ([1], False)
+    document = web.browser().get("/api/v1/me", headers=token).json()
+    assert ([course["id"] for course in document["courses"]], document["operator"]) == ([1], False)
     assert web.browser().get("/api/v1/courses/2/mine/assignments", headers=token).status_code == 404
     # It does not give access to the same course in another role either.
     with web.store.transaction() as session:
@@ -135,8 +135,8 @@ def test_a_token_opens_no_browser_that_may_more(web: Web) -> None:
     wider = {"name": "t", "word": "w", "scopes": ["read", "manage"]}
     assert submit(browser, "/account/tokens", wider).status_code == 422
     follows = token_of(browser, "read")
-    told = web.browser().get("/api/v1/me", headers=follows).json()
-    assert ([each["id"] for each in told["courses"]], told["scopes"]) == ([course.course_id], ["read"])
+    document = web.browser().get("/api/v1/me", headers=follows).json()
+    assert ([each["id"] for each in document["courses"]], document["scopes"]) == ([course.course_id], ["read"])
 
 
 def test_a_token_without_course_but_with_scopes_limits_its_browser(web: Web) -> None:
@@ -186,8 +186,8 @@ def test_a_platforms_session_reaches_the_platforms_courses(web: Web) -> None:
     assert browser.get(f"/courses/{launched.course_id}/people").status_code == 200
     for path in (f"/courses/{local.course_id}/people", "/operator"):
         assert browser.get(path).status_code == 404
-    told = web.browser().get("/api/v1/me", headers=token_of(browser, *EVERY_SCOPE)).json()
-    assert [each["id"] for each in told["courses"]] == [launched.course_id]
+    document = web.browser().get("/api/v1/me", headers=token_of(browser, *EVERY_SCOPE)).json()
+    assert [each["id"] for each in document["courses"]] == [launched.course_id]
 
 
 def test_owners_see_and_end_their_sessions_and_tokens(web: Web, ada: Member) -> None:
@@ -195,9 +195,9 @@ def test_owners_see_and_end_their_sessions_and_tokens(web: Web, ada: Member) -> 
     token = token_of(browser, "read", "sign-in")
     listed = web.browser().get("/api/v1/me/credentials", headers=token).json()["items"]
     assert sorted(each["kind"] for each in listed) == ["session", "session", "token"]
-    shown = browser.get("/account").text
-    assert shown.count("/account/sessions/") == 1
-    (ends,) = [each["id"] for each in listed if f"/account/sessions/{each['id']}/end" in shown]
+    page_text = browser.get("/account").text
+    assert page_text.count("/account/sessions/") == 1
+    (ends,) = [each["id"] for each in listed if f"/account/sessions/{each['id']}/end" in page_text]
     assert submit(browser, f"/account/sessions/{ends}/end").status_code == 303
     assert other.get("/account").status_code == 303
     assert submit(browser, f"/account/sessions/{ends}/end").status_code == 404
@@ -310,8 +310,8 @@ def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> 
     assert all(each.get("/account").status_code == 200 for each in browsers)
     browser = browsers[0]
     for number in range(MAX_TOKENS + 1):
-        asked = {"name": "t", "word": f"w{number}", "scopes": ["read"]}
-        answer = submit(browser, "/account/tokens", asked)
+        body = {"name": "t", "word": f"w{number}", "scopes": ["read"]}
+        answer = submit(browser, "/account/tokens", body)
         assert answer.status_code == (303 if number < MAX_TOKENS else 409)
     assert "Revoke a token first" in answer.text
     # The same form again creates nothing new, so it gets the same answer.
@@ -320,13 +320,13 @@ def test_the_number_of_sessions_and_tokens_is_bounded(web: Web, ada: Member) -> 
 
 def test_students_are_offered_what_students_may_do(web: Web, grace: TestClient, ada: Member) -> None:
     browser = web.browser(ada)
-    shown = browser.get("/account").text
-    assert [scope for scope in SCOPES if f'value="{scope}"' in shown] == ["read", "submit", "sign-in"]
-    shown = grace.get("/account").text
-    assert [scope for scope in SCOPES if f'value="{scope}"' in shown] == list(SCOPES)
+    page_text = browser.get("/account").text
+    assert [scope for scope in SCOPES if f'value="{scope}"' in page_text] == ["read", "submit", "sign-in"]
+    page_text = grace.get("/account").text
+    assert [scope for scope in SCOPES if f'value="{scope}"' in page_text] == list(SCOPES)
     for scope in ("mark", "manage", "nothing"):
-        asked = {"name": "t", "word": "w", "scopes": ["read", scope]}
-        refused = submit(browser, "/account/tokens", asked)
+        body = {"name": "t", "word": "w", "scopes": ["read", scope]}
+        refused = submit(browser, "/account/tokens", body)
         assert (refused.status_code, "read, submit, sign-in" in words(refused.text)) == (422, True)
 
 
@@ -335,10 +335,10 @@ def test_a_name_is_that_of_its_course(web: Web, grace: TestClient, ada: Member) 
     table = {"file": ("x.csv", b"id,name,email\nada,Renamed,renamed@example.org\n")}
     assert submit(grace, "/courses/1/people/table", files=table).status_code == 303
     with web.store.reading() as session:
-        found = {
+        names = {
             each.course_id: (each.name, each.email) for _, each in membership.load_enrolments(session, ada.person_id)
         }
-    assert found == {1: ("Renamed", "renamed@example.org"), other.course_id: ("Also Ada", "")}
+    assert names == {1: ("Renamed", "renamed@example.org"), other.course_id: ("Also Ada", "")}
     linus = web.browser(web.instructor("linus", "two"))
     assert "Renamed" not in linus.get(f"/courses/{other.course_id}/people").text
 
@@ -353,20 +353,20 @@ def test_a_courses_data_tells_no_credentials_of_another(web: Web, ada: Member) -
     headers = web.token(web.instructor(), "manage")
     packed = web.browser().get(f"/api/v1/courses/1/people/{ada.enrolment_id}/data", headers=headers).content
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
-        told = json.loads(archive.read("student.json"))
-    assert [each["name"] for each in told["signed_in_with"]] == ["here"]
+        document = json.loads(archive.read("student.json"))
+    assert [each["name"] for each in document["signed_in_with"]] == ["here"]
 
 
 def test_a_stored_answer_ends_with_the_role(web: Web) -> None:
     grace = web.instructor()
     headers = web.token(grace, "manage") | {"idempotency-key": "k"}
-    path, asked = "/api/v1/courses/1/people", {"students": [{"id": "bob"}]}
+    path, body = "/api/v1/courses/1/people", {"students": [{"id": "bob"}]}
     for _ in range(2):
-        assert web.browser().post(path, headers=headers, json=asked).status_code == 201
+        assert web.browser().post(path, headers=headers, json=body).status_code == 201
     with web.store.transaction() as session:
         # Also without the condition that would end the token.
         session.execute(update(Enrolment).where(Enrolment.id == grace.enrolment_id).values(role=Role.STUDENT))
-    assert web.browser().post(path, headers=headers, json=asked).status_code == 404
+    assert web.browser().post(path, headers=headers, json=body).status_code == 404
 
 
 def test_an_operator_signs_somebody_out(web: Web, ada: Member) -> None:
@@ -409,9 +409,9 @@ def test_an_operator_joins_two_whom_the_form_names(web: Web) -> None:
     first = web.instructor("grace", "one")
     browser = web.browser(first)
     where = submit(root, "/operator/courses", {"course": "two", "who": "grace", "name": "G. Hopper"})
-    shown = root.get(where.headers["location"]).text
-    assert "Grace (grace) is also an instructor of one." in words(shown)
-    target = shown.partition('href="/operator/people/')[2].partition('"')[0].replace("&amp;", "&")
+    page_text = root.get(where.headers["location"]).text
+    assert "Grace (grace) is also an instructor of one." in words(page_text)
+    target = page_text.partition('href="/operator/people/')[2].partition('"')[0].replace("&amp;", "&")
     both = root.get(f"/operator/people/{target}").text
     assert "This joins G. Hopper and Grace into one person with all these courses" in words(both)
     second = int(target.partition("?")[0])
@@ -437,8 +437,8 @@ def test_programs_join_and_say_whom_an_id_is_shared_with(web: Web) -> None:
     path = f"/api/v1/operator/people/{made[1]['enrolment']}/join"
     joined = program.post(path, headers=headers, json={"other": made[0]["enrolment"]})
     assert sorted(each["course"] for each in joined.json()["enrolments"]) == ["one", "two"]
-    found = program.get("/api/v1/operator/people", headers=headers, params={"course": "one", "id": "grace"}).json()
-    assert found == joined.json()
+    document = program.get("/api/v1/operator/people", headers=headers, params={"course": "one", "id": "grace"}).json()
+    assert document == joined.json()
 
 
 @pytest.mark.parametrize("case", ["the same course", "a platform's person", "nobody"])

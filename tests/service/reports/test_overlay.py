@@ -144,11 +144,11 @@ def test_nothing_hidden_is_in_a_students_replay() -> None:
     mine, other = hiding(build.line_follower_grade()), hiding(parting_grade())
     secret = replace(other.trials[1].recording, printed=(TimedText(1.0, "SECRETPRINT"),))
     other = replace(other, trials=(other.trials[0], replace(other.trials[1], recording=secret)))
-    for view, told in ((build_student_view(mine), False), (build_staff_view(mine), True)):
+    for view, each in ((build_student_view(mine), False), (build_staff_view(mine), True)):
         replay = build_grade_replay(
             view, overlay_trials=select_overlay_trials(view, other, "other", BEFORE_PUBLICATION)
         )
-        assert ("SECRETPRINT" in json.dumps(replay)) is told
+        assert ("SECRETPRINT" in json.dumps(replay)) is each
 
 
 def test_of_the_other_trial_there_is_what_is_drawn_and_told_and_no_more() -> None:
@@ -189,8 +189,8 @@ def test_hostile_names_and_texts_are_visible_and_capped() -> None:
     view = build_student_view(build.hostile_grade())
     others = select_overlay_trials(view, build.hostile_grade(), build.HOSTILE * 99, BEFORE_PUBLICATION)
     over = build_grade_replay(view, overlay_trials=others)["trials"][0]["over"]
-    told = json.dumps(over, ensure_ascii=False)
-    assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(told)
+    output = json.dumps(over, ensure_ascii=False)
+    assert not {"\x1b", "\x00", "\u202e", "\u200b", "\u2028"} & set(output)
     assert len(over["name"]) <= 60
     assert over["left_out"] == 3001 - 2000
     assert over["parted"] is None

@@ -59,17 +59,17 @@ def test_what_is_too_large_of_either_is_cut(relayed: Grade) -> None:
 
 def test_traces_and_json_have_both(relayed: Grade) -> None:
     recording = relayed.trials[0].recording
-    told = build_trace(recording)
-    assert told["partner"]["spoken"] == [[line.t, line.text] for line in partner_of(recording).spoken]
+    trace = build_trace(recording)
+    assert trace["partner"]["spoken"] == [[line.t, line.text] for line in partner_of(recording).spoken]
     document = json.loads(json.dumps(build_json_document(build_staff_view(relayed))))
     assert document["trials"][0]["partner"]["spoken"] == ["I see grey"]
     assert document["trials"][0]["spoken"] == []
 
 
 def test_the_diagram_has_a_lane_for_each_and_every_text_once(relayed: Grade, crashed: Grade) -> None:
-    told = build_conversation(relayed.trials[0].recording, max_exchanges=50)
-    assert told.parties == ("robot", "responder", "robot 2")
-    arrows = [(step.source, step.target) for step in told.steps if isinstance(step, Step)]
+    conversation = build_conversation(relayed.trials[0].recording, max_exchanges=50)
+    assert conversation.parties == ("robot", "responder", "robot 2")
+    arrows = [(step.source, step.target) for step in conversation.steps if isinstance(step, Step)]
     assert arrows.count(("robot", "responder")) == arrows.count(("responder", "robot")) == 1
     assert arrows.count(("robot 2", "responder")) == arrows.count(("responder", "robot 2")) == 4
     linked = build_conversation(crashed.trials[0].recording)
@@ -103,9 +103,9 @@ def test_plots_are_drawn_and_name_both(relayed: Grade) -> None:
         (relayed, set()),
         (replace(relayed, trials=moved), {"path", "sensors"}),
     ):
-        told = {plot.kind: plot.alt for plot in list_plots(pair)}
-        assert told.keys() == kinds
+        descriptions = {plot.kind: plot.alt for plot in list_plots(pair)}
+        assert descriptions.keys() == kinds
         assert draw_all_plots(pair).keys() == {plot.name for plot in list_plots(pair)}
-    assert "Path of the second robot from (2000, 200) mm to (2000, 200) mm." in told["path"]
+    assert "Path of the second robot from (2000, 200) mm to (2000, 200) mm." in descriptions["path"]
     talk = build_page(build_staff_view(relayed)).scenes[0].talk
     assert "robot to responder 1, responder to robot 1, robot 2 to responder 4, responder to robot 2 4." in talk
