@@ -61,7 +61,9 @@ def test_nothing_that_a_student_wrote_becomes_markup_or_is_endless(page: str) ->
 
 def test_pairs_beyond_the_most_are_counted() -> None:
     many = dataclasses.replace(FOUND, pairs=FOUND.pairs * 5)
-    assert "3 more pairs are not shown." in render_similarity_page(build_similarity_view([many]), text_of, "Alike", 2)
+    view = build_similarity_view([many])
+    assert "3 more pairs are not shown." in render_similarity_page(view, text_of, "Similar", 2)
+    assert "1 more pair is not shown." in render_similarity_page(view, text_of, "Similar", 4)
 
 
 def test_json_has_everything() -> None:

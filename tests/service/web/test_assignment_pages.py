@@ -91,6 +91,8 @@ def test_an_own_assignment_is_checked_prepared_and_previewed(web: Web, grace: Te
         role = select(Enrolment.role).join(SubmissionRow, SubmissionRow.enrolment_id == Enrolment.id)
         assert session.scalars(role).all() == [Role.INSTRUCTOR]
     assert submit(grace, f"{answer.headers['location']}/preview").status_code == 303
+    german = grace.get(answer.headers["location"], headers={"accept-language": "de"}).text
+    assert "</a>: in der Warteschlange</li>" in german
     files["mine/assignment.toml"] += '\n[[criterion]]\ntitle = "No check"\nmarks = 1\n'
     own = {"file": ("mine.zip", zipped(files), "application/zip")}
     answer = submit(grace, f"{HOME}/assignments/uploads", files=own)

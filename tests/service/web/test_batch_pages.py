@@ -366,6 +366,8 @@ def test_publishing_all_and_publishing_one(web: Web, grace: TestClient) -> None:
         assert session.get_one(Job, one).published_by == "Grace (person 1)"
         assert session.get_one(Job, other).published_at is None
         assert [entry.action for entry in audit.load_entries(session, "job", one)] == ["publish"]
+    german = grace.get(f"{HOME}/grades/{one}", headers={"accept-language": "de"}).text
+    assert re.search(r"Grace \(person 1\): veröffentlicht</li>", german)
     answer = submit(grace, f"{HOME}/batches/{made.id}/publish")
     assert "1 grade published." in words(grace.get(answer.headers["location"]).text)
     with web.store.reading() as session:
