@@ -236,15 +236,15 @@ def _render_page(
             if drawn_plots is not None and has_built_in_floors
             else stored_requests.load_assignment(session, line.id)
         )
-    shown = dict(drawn_plots or {})
+    rendered_plots = dict(drawn_plots or {})
 
     def render() -> str:
         if drawn_plots is None and assignment is not None:
-            shown.update(draw_plots(grade, assignment, submission))
+            rendered_plots.update(draw_plots(grade, assignment, submission))
         floors = load_own_floors(assignment) if assignment is not None else {}
-        return render_report_page(view, shown, submission, floors, overlay_trials)
+        return render_report_page(view, rendered_plots, submission, floors, overlay_trials)
 
-    return render_or_explain(view, render), shown
+    return render_or_explain(view, render), rendered_plots
 
 
 def _build_view(session: Session, line: JobLine, grade: Grade, language: Language = ENGLISH) -> View:

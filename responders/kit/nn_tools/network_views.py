@@ -159,11 +159,11 @@ def quick_progress_tracked_training(
 
 
 def _build_rows(images: Any, size: tuple[int, int] | None, jiggled: bool, use_signature: bool, fill: int) -> list[Any]:
-    shown = [as_image(image) for image in images] if size is None else resized_images_pipeline(images, size)
-    shown = [jiggle(image) for image in shown] if jiggled else shown
+    prepared_images = [as_image(image) for image in images] if size is None else resized_images_pipeline(images, size)
+    prepared_images = [jiggle(image) for image in prepared_images] if jiggled else prepared_images
     if use_signature:
-        return [generate_signature(image, linear=True, fill=fill) for image in shown]
-    return [get_image_features(image) for image in shown]
+        return [generate_signature(image, linear=True, fill=fill) for image in prepared_images]
+    return [get_image_features(image) for image in prepared_images]
 
 
 def resized_images_pipeline(
