@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from sqlalchemy import Engine, column, inspect, select, table
+from sqlalchemy import Engine, Select, column, inspect, select, table
 from sqlalchemy.engine import Connection
 from sqlalchemy.orm import Session
 
@@ -76,4 +76,14 @@ def load_schema_state(engine: Engine) -> SchemaState:
 
 def needs_newer_code(session: Session) -> bool:
     """Return whether a migration has made the tables unusable for the running code."""
-    return str(session.scalar(select(_COMPATIBILITY.c.oldest_compatible)) or "") > find_newest_revision()
+    return is_newer_than_code(session.scalar(select_oldest_compatible()))
+
+
+def select_oldest_compatible() -> Select[str]:
+    """Return a query for the oldest revision whose code can use the tables."""
+    return select(_COMPATIBILITY.c.oldest_compatible)
+
+
+def is_newer_than_code(oldest_compatible: str | None) -> bool:
+    """Return whether tables for which this revision is the oldest compatible one are unusable for the running code."""
+    return str(oldest_compatible or "") > find_newest_revision()

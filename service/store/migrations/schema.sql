@@ -140,8 +140,6 @@ CREATE INDEX ix_job_enrolment_id ON job (enrolment_id);
 
 CREATE INDEX ix_job_plots_plots_due_at ON job (plots, plots_due_at);
 
-CREATE INDEX ix_job_started_at ON job (started_at);
-
 CREATE INDEX ix_job_state_lane_due_at ON job (state, lane, due_at);
 
 CREATE INDEX ix_job_state_lease_until ON job (state, lease_until);
@@ -492,8 +490,8 @@ CREATE TABLE "open_assignment" (
 	names_hidden BOOLEAN NOT NULL, 
 	batch_id VARCHAR(12), 
 	CONSTRAINT pk_open_assignment PRIMARY KEY (id), 
-	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
+	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_batch_id_batch FOREIGN KEY(batch_id) REFERENCES batch (id)
 );
 
@@ -512,5 +510,9 @@ CREATE TABLE schema_compatibility (
 );
 
 CREATE INDEX ix_credential_token_id ON credential (token_id);
+
+CREATE INDEX ix_job_waiting ON job (state, lane, batch_id, queued_at, id, enrolment_id, due_at) WHERE state = 'queued';
+
+CREATE INDEX ix_job_started_at_lane_batch_id_enrolment_id ON job (started_at, lane, batch_id, enrolment_id);
 
 INSERT INTO schema_compatibility VALUES (1, '0019')

@@ -11,10 +11,12 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import ColumnElement, CursorResult, Select, select, update
+from sqlalchemy import ColumnElement, CursorResult, Select, Table, bindparam, select, update
 from sqlalchemy.orm import Session
+from sqlalchemy.sql.dml import ReturningUpdate
 
 from service.store import outbox, phases
 from service.store.codec import encode
@@ -23,8 +25,7 @@ from service.store.grades import overrides, plots, result_cache
 from service.store.installation import load_secret
 from service.store.locks import match_and_lock_jobs
 from service.store.queue import workers
-from service.store.queue.scheduling import find_next_job
-from service.store.revision import needs_newer_code
+from service.store.queue.scheduling import check_worker, find_next_job
 from service.store.states import CancelReason, JobState, PlotState
 from service.store.tables.submissions import Job
 from service.version import hash_grader
@@ -146,24 +147,43 @@ def queue_over_limit_job(session: Session, job_id: str, current_time: datetime) 
 def claim_job(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Claim the next job; None if no job is due or the worker may not claim."""
     with store.transaction() as session:
-        current_time = now(session)
-        may_claim = not needs_newer_code(session) and not workers.is_in_quarantine(session, worker)
-        job_id = find_next_job(session, current_time, worker) if may_claim else None
-        if job_id is None:
+        current_time = check_worker(session, worker)
+        job_id = None if current_time is None else find_next_job(session, current_time, worker)
+        if current_time is None or job_id is None:
             return None
-        attempts, max_attempts = session.execute(select(Job.attempt, Job.max_attempts).where(Job.id == job_id)).one()
-        claim = Claim(job_id, secrets.token_hex(16), attempts + 1, max_attempts, current_time)
+        lease = secrets.token_hex(16)
         values = {
-            "attempt": Job.attempt + 1,
-            "lease": claim.lease,
+            "job_id": job_id,
+            "lease": lease,
             "lease_until": current_time + timedelta(seconds=lease_seconds),
-            "heartbeat_at": current_time,
-            "started_at": current_time,
+            "current_time": current_time,
             "worker": worker,
             "process": os.getpid(),
-            "progress": 0.0,
         }
-        return claim if _apply_transition(session, CLAIM, (Job.id == job_id,), current_time, values) else None
+        row = session.connection().execute(_build_claim_statement(), values).one_or_none()
+        return None if row is None else Claim(job_id, lease, row.attempt, row.max_attempts, current_time)
+
+
+@cache
+def _build_claim_statement() -> ReturningUpdate[Any]:
+    """Return the statement that takes a job whose row is locked. It is built once, because claims are frequent."""
+    table = cast("Table", Job.__table__)
+    return (
+        update(table)
+        .where(table.c.id == bindparam("job_id"), table.c.state.in_(CLAIM.before))
+        .values(
+            state=CLAIM.after,
+            attempt=table.c.attempt + 1,
+            lease=bindparam("lease"),
+            lease_until=bindparam("lease_until"),
+            heartbeat_at=bindparam("current_time"),
+            started_at=bindparam("current_time"),
+            worker=bindparam("worker"),
+            process=bindparam("process"),
+            progress=0.0,
+        )
+        .returning(table.c.attempt, table.c.max_attempts)
+    )
 
 
 @retry_conflicts

@@ -9,12 +9,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import and_, case, func, or_, select
+from sqlalchemy import ColumnElement, Subquery, and_, case, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
 from service.store.queue import workers
-from service.store.queue.scheduling import match_claimable_jobs, select_recent_jobs, select_shares
+from service.store.queue.scheduling import SHARE_WINDOW, match_claimable_jobs, select_recent_jobs
 from service.store.states import JobQueue, JobState
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
@@ -69,9 +69,12 @@ def estimate_places(session: Session, job_ids: Collection[str]) -> dict[str, Que
 
 def _count_jobs_before(session: Session, job_ids: Collection[str], current_time: datetime) -> dict[str, int]:
     """Return the number of claimable jobs ahead of each of these jobs, by id."""
-    recent_jobs = select_recent_jobs(current_time).cte("recent")
-    course_shares = select_shares(recent_jobs.c.course_id)
-    batch_shares, student_shares = select_shares(recent_jobs.c.batch_id), select_shares(recent_jobs.c.enrolment_id)
+    recent_jobs = select_recent_jobs(current_time - SHARE_WINDOW).cte("recent")
+    batch_shares, student_shares = _select_shares(recent_jobs.c.batch_id), _select_shares(recent_jobs.c.enrolment_id)
+    recent_courses = (
+        select(Enrolment.course_id).join(recent_jobs, recent_jobs.c.enrolment_id == Enrolment.id).subquery()
+    )
+    course_shares = _select_shares(recent_courses.c.course_id)
     order = (
         Job.lane == JobQueue.BATCH,
         func.coalesce(course_shares.c.begun, 0),
@@ -93,6 +96,11 @@ def _count_jobs_before(session: Session, job_ids: Collection[str], current_time:
     )
     query = select(ranked_jobs.c.id, func.coalesce(ranked_jobs.c.earlier, 0)).where(ranked_jobs.c.id.in_(job_ids))
     return dict(session.execute(query).all())
+
+
+def _select_shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
+    """Return a subquery that counts the recently started jobs of each course, batch or student."""
+    return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()
 
 
 def _measure_usual_seconds(session: Session) -> float | None:

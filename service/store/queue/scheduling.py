@@ -1,26 +1,72 @@
 """Scheduling: the next job by queue, by fair share of course, batch and student, and by age.
 
-Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim_job`` takes the job.
+Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim_job`` takes the job. The cost of a claim depends on the
+number of batches with waiting jobs, not on the number of these jobs: each step reads the start of an index. The
+statements are built once, because building one takes longer than running it.
 """
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from functools import cache
+from itertools import groupby
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, not_, or_, select
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    CompoundSelect,
+    Select,
+    and_,
+    bindparam,
+    case,
+    func,
+    literal,
+    literal_column,
+    not_,
+    null,
+    or_,
+    select,
+    union_all,
+)
+from sqlalchemy.engine import Connection
 from sqlalchemy.orm import Session
+from sqlalchemy.sql.selectable import CTE
 
-from service.store.queue.workers import match_other_live_worker
+from service.store.engine import now
+from service.store.queue.workers import ALIVE_PERIOD, match_other_live_worker
+from service.store.revision import is_newer_than_code, select_oldest_compatible
 from service.store.states import BatchState, JobQueue, JobState
+from service.store.tables.installation import Worker
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Batch, Job
 
 #: Shares count only jobs started within this time, so earlier use is no disadvantage.
 SHARE_WINDOW = timedelta(seconds=60)
+#: Shares count at most this number of jobs, the last ones, so that counting takes the same time at any load.
+MAX_SHARE_JOBS = 250
 #: One in this number of started jobs is from a batch, even if interactive jobs wait.
 BATCH_JOB_INTERVAL = 5
 #: Time for which a job that failed on one worker is reserved for the other workers.
 RESERVED_PERIOD = timedelta(seconds=20)
+
+_JOB, _BATCH, _ENROLMENT, _WORKER = (table.__table__ for table in (Job, Batch, Enrolment, Worker))
+# Written into the statement: with a parameter instead, no database would use an index of queued jobs only.
+_IS_QUEUED: ColumnElement[bool] = literal_column(f"job.state = '{JobState.QUEUED.value}'")
+_ZERO: ColumnElement[int] = literal_column("0")
+_ONE: ColumnElement[int] = literal_column("1")
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """The waiting jobs of one queue, course and batch, or of a course without a batch."""
+
+    lane: JobQueue
+    course_id: int
+    batch_id: str | None
 
 
 def match_claimable_jobs(current_time: datetime) -> tuple[ColumnElement[bool], ...]:
@@ -33,63 +79,238 @@ def match_claimable_jobs(current_time: datetime) -> tuple[ColumnElement[bool], .
     )
 
 
-def select_recent_jobs(current_time: datetime) -> Select[JobQueue, int, str | None, int]:
-    """Return a query for the queue, course, batch and student of every job that counts towards a share."""
+def select_recent_jobs(since: datetime | BindParameter[datetime]) -> Select[JobQueue, str | None, int]:
+    """Return a query for the queue, batch and student of every job that counts towards a share."""
     return (
-        select(Job.lane, Enrolment.course_id, Job.batch_id, Job.enrolment_id)
-        .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .where(Job.started_at > current_time - SHARE_WINDOW)
+        select(_JOB.c.lane, _JOB.c.batch_id, _JOB.c.enrolment_id)
+        .where(_JOB.c.started_at > since)
+        .order_by(_JOB.c.started_at.desc())
+        .limit(literal_column(str(MAX_SHARE_JOBS)))
     )
+
+
+def check_worker(session: Session, worker: str) -> datetime | None:
+    """Return the database's clock; None if the worker is in quarantine or its code is too old for the tables."""
+    query = _build_worker_query(session.get_bind().dialect.name)
+    clock, oldest_compatible, quarantined_at = session.connection().execute(query, {"worker": worker}).one()
+    if is_newer_than_code(oldest_compatible) or quarantined_at is not None:
+        return None
+    return now(session) if clock is None else clock.astimezone(UTC)
 
 
 def find_next_job(session: Session, current_time: datetime, worker: str) -> str | None:
     """Return the id of the job that ``worker`` should claim next; None if no job is due.
 
-    Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest jobs started in
-    the last minute comes first, then the batch, then the student, then the oldest job.
+    Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest recently started
+    jobs comes first, then the batch, then the student, then the oldest job.
     """
-    # A common table expression; without it SQLite would scan all jobs to count each share.
-    recent_jobs = select_recent_jobs(current_time).cte("recent")
-    queue_rows = session.execute(select(recent_jobs.c.lane, func.count()).group_by(recent_jobs.c.lane))
-    job_counts: dict[JobQueue, int] = dict(queue_rows.all())
-    interactive_jobs, batch_jobs = job_counts.get(JobQueue.INTERACTIVE, 0), job_counts.get(JobQueue.BATCH, 0)
-    first_queue = (
-        JobQueue.BATCH if interactive_jobs >= (BATCH_JOB_INTERVAL - 1) * (batch_jobs + 1) else JobQueue.INTERACTIVE
+    connection = session.connection()
+    parameters = {
+        "share_since": current_time - SHARE_WINDOW,
+        "current_time": current_time,
+        "worker": worker,
+        "reserved_since": current_time - RESERVED_PERIOD,
+        "alive_since": current_time - ALIVE_PERIOD,
+    }
+    groups, job_counts = list[_Group](), Counter[_Group]()
+    for lane, course_id, batch_id, count in connection.execute(_build_group_query(), parameters):
+        group = _Group(lane, course_id, batch_id)
+        if count:
+            job_counts[group] += count
+        else:
+            groups.append(group)
+    for tied_groups in _rank_groups(groups, job_counts):
+        job_id = _find_first_job(connection, tied_groups, parameters)
+        if job_id is not None:
+            return job_id
+    return None
+
+
+def _rank_groups(groups: Sequence[_Group], job_counts: Mapping[_Group, int]) -> Iterator[list[_Group]]:
+    """Yield groups in the order in which their jobs are claimed; those with equal shares together."""
+    lanes, courses, batches = Counter[JobQueue](), Counter[int](), Counter[str | None]()
+    for group, count in job_counts.items():
+        lanes[group.lane] += count
+        courses[group.course_id] += count
+        batches[group.batch_id] += count
+    # Jobs without a batch have no batch to share with.
+    batches[None] = 0
+    has_batch_turn = lanes[JobQueue.INTERACTIVE] >= (BATCH_JOB_INTERVAL - 1) * (lanes[JobQueue.BATCH] + 1)
+    first_queue = JobQueue.BATCH if has_batch_turn else JobQueue.INTERACTIVE
+
+    def compute_rank(group: _Group) -> tuple[bool, int, int]:
+        return group.lane is not first_queue, courses[group.course_id], batches[group.batch_id]
+
+    for _, tied_groups in groupby(sorted(groups, key=compute_rank), compute_rank):
+        yield list(tied_groups)
+
+
+def _find_first_job(
+    connection: Connection, tied_groups: Sequence[_Group], parameters: Mapping[str, object]
+) -> str | None:
+    """Return the job of the student with the fewest recently started jobs, or else the oldest, and lock its row."""
+    batch_ids = [group.batch_id for group in tied_groups if group.batch_id is not None]
+    course_ids = [group.course_id for group in tied_groups if group.batch_id is None]
+    parameters = {**parameters, "lane": tied_groups[0].lane, "batch_ids": batch_ids, "course_ids": course_ids}
+    for in_batches, without_batch in (
+        (_build_batch_query(), _build_single_query()),
+        (_build_served_batch_query(), _build_served_single_query()),
+    ):
+        queries = [query for query, values in ((in_batches, batch_ids), (without_batch, course_ids)) if values]
+        rows = [tuple(row) for query in queries for row in connection.execute(query, parameters)]
+        if rows:
+            *_, job_id = min(rows)
+            return str(job_id)
+    return None
+
+
+@cache
+def _build_worker_query(dialect: str) -> Select[Any]:
+    """Return the query for the database's clock if it has one, the oldest compatible revision, and a quarantine."""
+    clock = null() if dialect == "sqlite" else func.clock_timestamp()
+    quarantine = select(_WORKER.c.quarantined_at).where(_WORKER.c.name == bindparam("worker"))
+    return select(clock, select_oldest_compatible().scalar_subquery(), quarantine.scalar_subquery())
+
+
+@cache
+def _build_group_query() -> CompoundSelect[Any]:
+    """Return the query for the groups with waiting jobs, and for those with recently started ones and their number."""
+    return union_all(_select_shares(), _select_waiting_batches(), _select_waiting_courses())
+
+
+def _select_shares() -> Select[Any]:
+    recent_jobs = _build_recent_jobs()
+    single_student = case((recent_jobs.c.batch_id.is_(None), recent_jobs.c.enrolment_id))
+    columns = (recent_jobs.c.lane, recent_jobs.c.batch_id, single_student.label("enrolment_id"))
+    counts = select(*columns, func.count().label("begun")).group_by(*columns).subquery("counts")
+    # Subqueries, because PostgreSQL would join all students to the few groups.
+    batch_course = select(_BATCH.c.course_id).where(_BATCH.c.id == counts.c.batch_id)
+    student_course = select(_ENROLMENT.c.course_id).where(_ENROLMENT.c.id == counts.c.enrolment_id)
+    course_id = func.coalesce(batch_course.scalar_subquery(), student_course.scalar_subquery())
+    return select(counts.c.lane, course_id, counts.c.batch_id, counts.c.begun)
+
+
+def _select_waiting_batches() -> Select[Any]:
+    """Return a query for the open batches with waiting jobs.
+
+    It jumps through the index from one batch to the next, without reading the jobs between.
+    """
+    lanes = union_all(*(select(literal(lane, _JOB.c.lane.type).label("lane")) for lane in JobQueue)).subquery("lanes")
+    first_batch = select(func.min(_JOB.c.batch_id)).where(_IS_QUEUED, _JOB.c.lane == lanes.c.lane)
+    waiting = select(lanes.c.lane, first_batch.scalar_subquery().label("batch_id")).cte("waiting", recursive=True)
+    next_batch = select(func.min(_JOB.c.batch_id)).where(
+        _IS_QUEUED, _JOB.c.lane == waiting.c.lane, _JOB.c.batch_id > waiting.c.batch_id
+    )
+    waiting = waiting.union_all(
+        select(waiting.c.lane, next_batch.scalar_subquery()).where(waiting.c.batch_id.is_not(None))
+    )
+    return (
+        select(waiting.c.lane, _BATCH.c.course_id, _BATCH.c.id, _ZERO)
+        .join(_BATCH, _BATCH.c.id == waiting.c.batch_id)
+        .where(_BATCH.c.state == BatchState.OPEN)
     )
 
-    course_shares = select_shares(recent_jobs.c.course_id)
-    batch_shares = select_shares(recent_jobs.c.batch_id)
-    student_shares = select_shares(recent_jobs.c.enrolment_id)
+
+def _select_waiting_courses() -> Select[Any]:
+    """Return a query for the courses with waiting jobs without a batch: single regrades, references of assignments."""
+    return (
+        select(_JOB.c.lane, _ENROLMENT.c.course_id, null(), _ZERO)
+        .join(_ENROLMENT, _ENROLMENT.c.id == _JOB.c.enrolment_id)
+        .where(_IS_QUEUED, _JOB.c.lane.in_(JobQueue), _JOB.c.batch_id.is_(None))
+        .distinct()
+    )
+
+
+@cache
+def _build_batch_query() -> Select[Any]:
+    """Return the query for the oldest job, in these batches, of a student without recently started jobs."""
+    first_job = (
+        select(_JOB.c.id)
+        .where(*_match_due_jobs(), _JOB.c.batch_id == _BATCH.c.id, _match_students_not_served())
+        .order_by(_JOB.c.queued_at, _JOB.c.id)
+        .limit(_ONE)
+        .with_for_update(skip_locked=True, key_share=True)
+        .correlate(_BATCH)
+        .scalar_subquery()
+    )
+    batches = select(first_job.label("id")).where(_BATCH.c.id.in_(bindparam("batch_ids", expanding=True)))
+    first_jobs = batches.cte("first_jobs")
+    chosen = _JOB.alias("chosen")
+    return (
+        select(chosen.c.queued_at, chosen.c.id)
+        .join(first_jobs, first_jobs.c.id == chosen.c.id)
+        .order_by(chosen.c.queued_at, chosen.c.id)
+        .limit(_ONE)
+    )
+
+
+@cache
+def _build_single_query() -> Select[Any]:
+    """Return the same query for the jobs without a batch in these courses."""
+    query = select(_JOB.c.queued_at, _JOB.c.id).where(
+        *_match_due_jobs(), *_match_single_jobs(), _match_students_not_served()
+    )
+    return _choose_first(query)
+
+
+@cache
+def _build_served_batch_query() -> Select[Any]:
+    """Return the query for the job, in these batches, of the student with the fewest recently started jobs, if any."""
+    return _build_served_query(_JOB.c.batch_id.in_(bindparam("batch_ids", expanding=True)))
+
+
+@cache
+def _build_served_single_query() -> Select[Any]:
+    """Return the same query for the jobs without a batch in these courses."""
+    return _build_served_query(*_match_single_jobs())
+
+
+def _build_served_query(*conditions: ColumnElement[bool]) -> Select[Any]:
+    students = _build_recent_jobs()
+    shares = (
+        select(students.c.enrolment_id, func.count().label("begun"))
+        .group_by(students.c.enrolment_id)
+        .subquery("shares")
+    )
     query = (
-        select(Job.id)
-        .join(Enrolment, Job.enrolment_id == Enrolment.id)
-        .outerjoin(course_shares, course_shares.c.share == Enrolment.course_id)
-        .outerjoin(batch_shares, batch_shares.c.share == Job.batch_id)
-        .outerjoin(student_shares, student_shares.c.share == Job.enrolment_id)
-        .where(*match_claimable_jobs(current_time), not_(_match_reserved_jobs(worker, current_time)))
-        .order_by(
-            case((Job.lane == first_queue, 0), else_=1),
-            func.coalesce(course_shares.c.begun, 0),
-            func.coalesce(batch_shares.c.begun, 0),
-            func.coalesce(student_shares.c.begun, 0),
-            Job.queued_at,
-            Job.id,
-        )
-        .limit(1)
-        .with_for_update(of=Job, skip_locked=True, key_share=True)
+        select(shares.c.begun, _JOB.c.queued_at, _JOB.c.id)
+        .join(shares, shares.c.enrolment_id == _JOB.c.enrolment_id)
+        .where(*_match_due_jobs(), *conditions)
     )
-    return session.scalar(query)
+    return _choose_first(query, shares.c.begun)
 
 
-def _match_reserved_jobs(worker: str, current_time: datetime) -> ColumnElement[bool]:
-    """Return the condition that a job failed with a host fault on this worker and another worker could try it."""
+def _choose_first(query: Select[Any], *order: ColumnElement[int]) -> Select[Any]:
+    ordered_jobs = query.order_by(*order, _JOB.c.queued_at, _JOB.c.id).limit(_ONE)
+    return ordered_jobs.with_for_update(of=_JOB, skip_locked=True, key_share=True)
+
+
+def _build_recent_jobs() -> CTE:
+    return select_recent_jobs(bindparam("share_since")).cte("recent")
+
+
+def _match_due_jobs() -> tuple[ColumnElement[bool], ...]:
+    """Return the conditions for a job of one queue that the worker may claim, if its batch is open."""
     # A stopped worker returns its jobs without a fault, and then no error is stored.
-    has_failed_here = and_(Job.attempt > 0, Job.worker == worker, Job.error.is_not(None))
-    return and_(
-        has_failed_here, Job.due_at > current_time - RESERVED_PERIOD, match_other_live_worker(worker, current_time)
+    has_failed_here = and_(_JOB.c.attempt > 0, _JOB.c.worker == bindparam("worker"), _JOB.c.error.is_not(None))
+    is_reserved = and_(
+        has_failed_here,
+        _JOB.c.due_at > bindparam("reserved_since"),
+        match_other_live_worker(bindparam("worker"), bindparam("alive_since")),
+    )
+    return (
+        _IS_QUEUED,
+        _JOB.c.lane == bindparam("lane"),
+        # An expression, because an index of this column is no use here, and SQLite has no statistics to see that.
+        func.coalesce(_JOB.c.due_at, null()) <= bindparam("current_time"),
+        not_(is_reserved),
     )
 
 
-def select_shares(share: ColumnElement[str | None] | ColumnElement[int]) -> Subquery:
-    """Return a subquery that counts the recently started jobs of each course, batch or student."""
-    return select(share.label("share"), func.count().label("begun")).group_by(share).subquery()
+def _match_single_jobs() -> tuple[ColumnElement[bool], ...]:
+    students = select(_ENROLMENT.c.id).where(_ENROLMENT.c.course_id.in_(bindparam("course_ids", expanding=True)))
+    return _JOB.c.batch_id.is_(None), _JOB.c.enrolment_id.in_(students)
+
+
+def _match_students_not_served() -> ColumnElement[bool]:
+    return _JOB.c.enrolment_id.not_in(select(_build_recent_jobs().c.enrolment_id))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import ColumnElement, delete, select
+from sqlalchemy import BindParameter, ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
@@ -90,13 +90,9 @@ def load_workers(session: Session) -> list[WorkerLine]:
     ]
 
 
-def match_other_live_worker(worker: str, current_time: datetime) -> ColumnElement[bool]:
-    """Return the condition that another worker was seen recently."""
-    return (
-        select(Heartbeat.worker)
-        .where(Heartbeat.worker != worker, Heartbeat.seen_at > current_time - ALIVE_PERIOD)
-        .exists()
-    )
+def match_other_live_worker(worker: BindParameter[str], since: BindParameter[datetime]) -> ColumnElement[bool]:
+    """Return the condition that another worker was seen after ``since``."""
+    return select(Heartbeat.worker).where(Heartbeat.worker != worker, Heartbeat.seen_at > since).exists()
 
 
 def is_in_quarantine(session: Session, worker: str, *, lock: bool = False) -> bool:

@@ -58,6 +58,7 @@ class SubmissionRow(Base):
 
 
 _STANDS = text("standing = 'stands'")
+_IS_QUEUED = text("state = 'queued'")
 
 
 class Job(Base):
@@ -67,7 +68,20 @@ class Job(Base):
     __table_args__ = (
         Index(None, "state", "lane", "due_at"),
         Index(None, "state", "lease_until"),
-        Index(None, "started_at"),
+        # The columns that a claim counts and compares, so that it reads only the row of the claimed job.
+        Index(None, "started_at", "lane", "batch_id", "enrolment_id"),
+        Index(
+            "ix_job_waiting",
+            "state",
+            "lane",
+            "batch_id",
+            "queued_at",
+            "id",
+            "enrolment_id",
+            "due_at",
+            sqlite_where=_IS_QUEUED,
+            postgresql_where=_IS_QUEUED,
+        ),
         Index(None, "plots", "plots_due_at"),
         Index(None, "worker", "finished_at"),
         # All columns counted for a batch, so that counting reads no job row.

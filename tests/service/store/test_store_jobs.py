@@ -240,6 +240,17 @@ def test_one_student_does_not_hold_up_the_others(store: Store) -> None:
     assert [_claim(store).job_id, _claim(store).job_id] == [other, again]
 
 
+def test_one_student_does_not_hold_up_the_others_in_another_batch(store: Store) -> None:
+    begun, older, newer = (
+        accept_batch(store, name, [grading_request(student, f"print('{name}')\n")], (), max_attempts=3).jobs[0].job_id
+        for name, student in (("begun", "keen"), ("older", "keen again"), ("newer", "other"))
+    )
+    with store.transaction() as session:
+        keen = session.get_one(Job, begun).enrolment_id
+        session.execute(update(Job).where(Job.id == older).values(enrolment_id=keen))
+    assert [_claim(store).job_id for _ in range(3)] == [begun, newer, older]
+
+
 def test_a_paused_batch_waits(store: Store) -> None:
     batch = _batch(store, "batch", 1)
     with store.transaction() as session:

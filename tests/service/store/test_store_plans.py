@@ -6,13 +6,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from sqlalchemy import event
+from sqlalchemy import event, insert, select
 from sqlalchemy.orm import Session
 
-from builders import accept_one, opened, settings_in
+from builders import accept_one, grading_request, opened, settings_in
 from service.store.batches import batches, job_lines
+from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
+from service.store.queue import jobs
 from service.store.queue.scheduling import find_next_job
+from service.store.states import Standing
+from service.store.tables.submissions import Job
 
 
 @pytest.fixture
@@ -40,6 +44,50 @@ def test_no_question_walks_through_all_jobs(sqlite: Store, ask: Callable[[Sessio
 
 def test_batches_are_counted_without_reading_their_jobs(sqlite: Store) -> None:
     assert any("SEARCH job USING COVERING INDEX" in line for line in _plans(sqlite, batches.list_batches))
+
+
+def test_a_claim_does_the_same_work_for_few_and_for_many_waiting_jobs(sqlite: Store) -> None:
+    students = ["ada", "bob", "cid"]
+    for name in ("first", "second"):
+        accept_batch(
+            sqlite, name, [grading_request(student, f"print('{name}')\n") for student in students], [], max_attempts=3
+        )
+    assert jobs.claim_job(sqlite, "worker", 60) is not None
+    few = _count_steps(sqlite)
+    _copy_waiting_jobs(sqlite, 1000)
+    assert _count_steps(sqlite) < 1.2 * few
+
+
+def test_a_claim_reads_waiting_and_started_jobs_from_indexes(sqlite: Store) -> None:
+    accept_batch(sqlite, "batch", [grading_request("ada")], [], max_attempts=3)
+    read = [
+        line for line in _plans(sqlite, lambda session: find_next_job(session, now(session), "worker")) if "job" in line
+    ]
+    indexes = ("ix_job_waiting", "ix_job_started_at_lane_batch_id_enrolment_id", "sqlite_autoindex_job_1")
+    assert [line for line in read if not any(index in line for index in indexes)] == []
+
+
+def _count_steps(store: Store) -> int:
+    """Return the steps, in tens, of SQLite's virtual machine for the choice of the next job."""
+    steps = []
+    with store.reading() as session:
+        connection = session.connection().connection.driver_connection
+        connection.set_progress_handler(lambda: steps.append(10), 10)  # type: ignore[union-attr]
+        assert find_next_job(session, now(session), "worker") is not None
+    return len(steps)
+
+
+def _copy_waiting_jobs(store: Store, count: int) -> None:
+    """Add copies of each waiting job, which wait behind it."""
+    with store.transaction() as session:
+        table = Job.__table__
+        rows = [dict(row._mapping) for row in session.execute(select(table).where(table.c.state == "queued"))]
+        copies = [
+            row | {"id": f"z{number}-{row['id'][:6]}", "standing": Standing.KEPT}
+            for row in rows
+            for number in range(count)
+        ]
+        session.execute(insert(table), copies)
 
 
 def _plans(store: Store, ask: Callable[[Session], object]) -> list[str]:
