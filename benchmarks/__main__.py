@@ -15,6 +15,7 @@ from benchmarks import (
     calibration,
     capacity,
     chaos,
+    claims,
     cold_batch,
     commands,
     costs,
@@ -50,6 +51,7 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "submission": submission.measure,
         "sandbox": sandbox.measure,
         "rows": rows.measure,
+        "claims": claims.measure,
         "queue": queue.measure,
         "web": web.measure,
     }

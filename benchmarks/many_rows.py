@@ -92,6 +92,17 @@ def fill(store: Store, image_of: GradedBatch) -> None:
         _requeue_last_batches(session)
 
 
+def cancel_waiting_jobs(store: Store, remaining: int) -> None:
+    """Cancel waiting jobs until this number remains, equally in each waiting batch."""
+    first = range((BATCHES - WAITING_BATCHES) * STUDENTS, GRADES, STUDENTS)
+    # The first jobs of a batch were claimed.
+    last = [start + STUDENTS - 1 - place for start in first for place in range(remaining // WAITING_BATCHES)]
+    kept_ids = [format_grade_name(number) for number in last]
+    with store.transaction() as session:
+        is_cancelled = (Job.state == JobState.QUEUED, Job.id.not_in(kept_ids))
+        session.execute(update(Job).where(*is_cancelled).values(state=JobState.CANCELLED))
+
+
 def _requeue_last_batches(session: Session) -> None:
     batch_ids = [format_batch_name(number) for number in range(BATCHES - WAITING_BATCHES, BATCHES)]
     graded_columns = ("verdict", "marks", "max_marks", "cache_key", "started_at", "graded_at", "finished_at", "worker")

@@ -86,7 +86,7 @@ def measure(times: int) -> list[Measurement]:
     """Measure the medians of nine or more repetitions on both databases."""
     return [
         _measure_query(database, store, question, max(times, _TIMES))
-        for database, store in _fill_databases()
+        for database, store in fill_databases()
         for question in _QUERIES
     ]
 
@@ -100,14 +100,14 @@ def _measure_query(database: str, store: Store, question: _TimedQuery, times: in
 
 def measure_claim() -> float:
     """Return the seconds of a claim in PostgreSQL with 10,000 waiting jobs."""
-    *_, seconds = (_time_query(_claim, store, _TIMES) for _, store in _fill_databases())
+    *_, seconds = (_time_query(_claim, store, _TIMES) for _, store in fill_databases())
     return median(seconds)
 
 
 def main(_arguments: list[str]) -> int:
     """Write the query plans of both databases."""
     parts = [f"How {many_rows.GRADES:,} grades are asked; written by python -m benchmarks plans.\n"]
-    for database, store in _fill_databases():
+    for database, store in fill_databases():
         for question in _QUERIES:
             parts.append(f"\n== {database}: {question.name}\n")
             parts += [f"\n{plan}\n" for plan in _collect_plans(store, question)]
@@ -119,17 +119,21 @@ def _time_query(ask: Callable[[Store], object], store: Store, times: int) -> lis
     return [measure_wall_seconds(lambda: ask(store)) for _ in range(times)]
 
 
-def _fill_databases() -> Iterator[tuple[str, Store]]:
+def fill_databases() -> Iterator[tuple[str, Store]]:
     """Yield both databases in turn. Each is removed before the next."""
     with tempfile.TemporaryDirectory() as folder, PostgresqlServer() as server:
         for database, url in (("SQLite", ""), ("PostgreSQL", create_database(server.url))):
             with open_store(load_settings(home=Path(folder), database_url=url)) as store:
                 many_rows.fill(store, create_graded_batch(store))
-                if url:
-                    # Autovacuum does this within minutes. For SQLite, the service doesn't do it either.
-                    with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-                        connection.exec_driver_sql("VACUUM ANALYZE")
+                vacuum(store)
                 yield database, store
+
+
+def vacuum(store: Store) -> None:
+    """Do for PostgreSQL what autovacuum does within minutes. For SQLite, the service doesn't do it either."""
+    if store.engine.dialect.name == "postgresql":
+        with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            connection.exec_driver_sql("VACUUM ANALYZE")
 
 
 def _collect_plans(store: Store, question: _TimedQuery) -> list[str]:

@@ -267,17 +267,17 @@ def _build_served_single_query() -> Select[Any]:
 
 def _build_served_query(*conditions: ColumnElement[bool]) -> Select[Any]:
     students = _build_recent_jobs()
-    shares = (
-        select(students.c.enrolment_id, func.count().label("begun"))
-        .group_by(students.c.enrolment_id)
-        .subquery("shares")
-    )
+    student_id = students.c.enrolment_id
+    shares = select(student_id, func.count().label("begun")).group_by(student_id).subquery("shares")
+    # Jobs of other students count, too: their last start may have left the share since the previous statement.
+    begun = func.coalesce(shares.c.begun, 0)
     query = (
-        select(shares.c.begun, _JOB.c.queued_at, _JOB.c.id)
-        .join(shares, shares.c.enrolment_id == _JOB.c.enrolment_id)
+        select(begun, _JOB.c.queued_at, _JOB.c.id)
+        .select_from(_JOB)
+        .outerjoin(shares, shares.c.enrolment_id == _JOB.c.enrolment_id)
         .where(*_match_due_jobs(), *conditions)
     )
-    return _choose_first(query, shares.c.begun)
+    return _choose_first(query, begun)
 
 
 def _choose_first(query: Select[Any], *order: ColumnElement[int]) -> Select[Any]:
