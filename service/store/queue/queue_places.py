@@ -69,7 +69,7 @@ def estimate_places(session: Session, job_ids: Collection[str]) -> dict[str, Que
 
 def _count_jobs_before(session: Session, job_ids: Collection[str], current_time: datetime) -> dict[str, int]:
     """Return the number of claimable jobs ahead of each of these jobs, by id."""
-    recent_jobs = select_recent_jobs(current_time - SHARE_WINDOW).cte("recent")
+    recent_jobs = select_recent_jobs(current_time - SHARE_WINDOW, current_time + SHARE_WINDOW).cte("recent")
     batch_shares, student_shares = _select_shares(recent_jobs.c.batch_id), _select_shares(recent_jobs.c.enrolment_id)
     recent_courses = (
         select(Enrolment.course_id).join(recent_jobs, recent_jobs.c.enrolment_id == Enrolment.id).subquery()

@@ -79,11 +79,16 @@ def match_claimable_jobs(current_time: datetime) -> tuple[ColumnElement[bool], .
     )
 
 
-def select_recent_jobs(since: datetime | BindParameter[datetime]) -> Select[JobQueue, str | None, int]:
-    """Return a query for the queue, batch and student of every job that counts towards a share."""
+def select_recent_jobs(
+    since: datetime | BindParameter[datetime], until: datetime | BindParameter[datetime]
+) -> Select[JobQueue, str | None, int]:
+    """Return a query for the queue, batch and student of every job that counts towards a share.
+
+    ``until`` leaves out jobs that were started before the clock was set back, which would take the places of others.
+    """
     return (
         select(_JOB.c.lane, _JOB.c.batch_id, _JOB.c.enrolment_id)
-        .where(_JOB.c.started_at > since)
+        .where(_JOB.c.started_at > since, _JOB.c.started_at < until)
         .order_by(_JOB.c.started_at.desc())
         .limit(literal_column(str(MAX_SHARE_JOBS)))
     )
@@ -107,6 +112,7 @@ def find_next_job(session: Session, current_time: datetime, worker: str) -> str 
     connection = session.connection()
     parameters = {
         "share_since": current_time - SHARE_WINDOW,
+        "share_until": current_time + SHARE_WINDOW,
         "current_time": current_time,
         "worker": worker,
         "reserved_since": current_time - RESERVED_PERIOD,
@@ -286,7 +292,7 @@ def _choose_first(query: Select[Any], *order: ColumnElement[int]) -> Select[Any]
 
 
 def _build_recent_jobs() -> CTE:
-    return select_recent_jobs(bindparam("share_since")).cte("recent")
+    return select_recent_jobs(bindparam("share_since"), bindparam("share_until")).cte("recent")
 
 
 def _match_due_jobs() -> tuple[ColumnElement[bool], ...]:

@@ -251,6 +251,16 @@ def test_one_student_does_not_hold_up_the_others_in_another_batch(store: Store) 
     assert [_claim(store).job_id for _ in range(3)] == [begun, newer, older]
 
 
+def test_starts_from_before_the_clock_was_set_back_are_no_share(store: Store) -> None:
+    ended = accept_batch(store, "ended", [grading_request("ada")], (), max_attempts=3)
+    claim = _claim(store)
+    _finish(store, claim)
+    _change(store, claim.job_id, started_at=datetime.now(UTC) + timedelta(hours=1))
+    older, newer = accept_one(store, "ada").job_id, accept_one(store, "bob").job_id
+    assert claim.job_id == ended.jobs[0].job_id
+    assert [_claim(store).job_id for _ in range(2)] == [older, newer]
+
+
 def test_a_paused_batch_waits(store: Store) -> None:
     batch = _batch(store, "batch", 1)
     with store.transaction() as session:
