@@ -121,17 +121,17 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             recording.end,
         )
     crossings = _find_crossings(criterion, points, line_progress, recording.ticks.per_second)
-    laps, spoilt_row = find_complete_laps(criterion, line_progress, crossings)
+    lap_count, laps, spoilt_row = find_complete_laps(criterion, line_progress, crossings)
     max_offset = float(np.abs(line_progress.offset[: _find_last_row(line_progress, crossings)]).max())
     driven_length = float(line_progress.progress.max() - line_progress.progress[0])
     measures = (
         *([Measure("lap time", min(lap for lap, _ in laps), "s")] if laps else []),
-        Measure("laps", len(laps)),
+        Measure("laps", lap_count),
         Measure("farthest off", max_offset, "mm"),
         Measure("part of a lap", driven_length / line_progress.length),
     )
     score = Fraction(min(max(driven_length / line_progress.length, 0.0) / criterion.laps, 1.0)).limit_denominator(1000)
-    if len(laps) < criterion.laps:
+    if lap_count < criterion.laps:
         if spoilt_row is not None:
             return fail_with(
                 f"Expected {_describe_laps(criterion.laps)} within {criterion.within:g} mm of {criterion.line.name}, "
@@ -159,7 +159,7 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             measures=measures,
         )
     return pass_with(
-        f"The robot drove {_describe_laps(len(laps))}, the best in {best:.2f} s.", *find_place(recording, row), measures
+        f"The robot drove {_describe_laps(lap_count)}, the best in {best:.2f} s.", *find_place(recording, row), measures
     )
 
 
@@ -193,31 +193,38 @@ def _find_crossings(criterion: Laps, points: Floats, line_progress: LineProgress
 
 def find_complete_laps(
     criterion: Laps, line_progress: LineProgress, crossings: list[Crossing]
-) -> tuple[list[tuple[float, int]], int | None]:
-    """Return the time and last row of each complete lap, and the row where leaving the line spoilt a lap, if any.
+) -> tuple[int, list[tuple[float, int]], int | None]:
+    """Return the complete laps.
 
     A lap begins at the last crossing from which it is complete, so it has the shortest time and the fewest ways to be
-    spoilt. Laps don't overlap.
+    spoilt.
+
+    Returns:
+        The largest number of laps that do not overlap; time and last row of each lap, overlapping ones included; and
+        the row where leaving the line spoilt a lap, if any.
     """
-    laps, spoilt_row = [], None
+    count, laps, spoilt_row = 0, [], None
     first_free = 0
     for number, crossing in enumerate(crossings):
         lap_starts = (
             begin
-            for begin in reversed(crossings[first_free:number])
-            if crossing.progress - begin.progress >= criterion.progress * line_progress.length
+            for begin in reversed(range(number))
+            if crossing.progress - crossings[begin].progress >= criterion.progress * line_progress.length
         )
-        lap_start = next(lap_starts, None)
-        if lap_start is None:
+        start_number = next(lap_starts, None)
+        if start_number is None:
             continue
+        lap_start = crossings[start_number]
         rows = slice(lap_start.row - line_progress.first, crossing.row - line_progress.first + 1)
         offsets = np.abs(line_progress.offset[rows])
         if offsets.max() <= criterion.within:
             laps.append((crossing.t - lap_start.t, crossing.row))
-            first_free = number
-        elif spoilt_row is None:
+            if start_number >= first_free:
+                count += 1
+                first_free = number
+        elif spoilt_row is None and start_number >= first_free:
             spoilt_row = lap_start.row - line_progress.first + int(np.argmax(offsets))
-    return laps, spoilt_row
+    return count, laps, spoilt_row
 
 
 def _find_last_row(line_progress: LineProgress, crossings: list[Crossing]) -> int:

@@ -87,7 +87,7 @@ def _copy_waiting_jobs(store: Store, count: int) -> None:
             for row in rows
             for number in range(count)
         ]
-        session.execute(insert(table), copies)
+        session.execute(insert(Job), copies)
 
 
 def _plans(store: Store, ask: Callable[[Session], object]) -> list[str]:
