@@ -117,7 +117,13 @@ def test_each_thing_has_an_example() -> None:
     assert DIFFS.keys() == TRIED.keys()
 
 
-@pytest.mark.parametrize("added", sorted(TRIED))
+#: What contributors add most. The others are long tests.
+_QUICK = ("criterion", "output format", "setting", "table and its migration")
+
+
+@pytest.mark.parametrize(
+    "added", [pytest.param(name, marks=[pytest.mark.long] * (name not in _QUICK)) for name in sorted(TRIED)]
+)
 def test_an_example_can_be_added_so(added: str, tmp_path: Path) -> None:
     for room in ROOMS:
         shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__", "catalogue"))

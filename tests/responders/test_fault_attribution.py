@@ -245,11 +245,16 @@ def test_naps_in_all_trials_together_are_counted(runner: TrialRunner) -> None:
     "responder",
     [
         f"{NAP}def responder(text): return text",
-        f"def responder(text):\n    {NAP.splitlines()[0]}\n    {NAP.splitlines()[1]}\n    return text",
         "import select\ndef responder(text):\n    for _ in range(90): select.select([], [], [], 0.01)\n    return text",
-        "import signal\ndef responder(text):\n    signal.setitimer(signal.ITIMER_REAL, 0.9)\n"
-        "    signal.signal(signal.SIGALRM, lambda *_: None)\n    signal.pause()\n    return text",
-        "import select\ndef responder(text):\n    select.poll().poll(900)\n    return text",
+        *(
+            pytest.param(text, marks=pytest.mark.long)
+            for text in (
+                f"def responder(text):\n    {NAP.splitlines()[0]}\n    {NAP.splitlines()[1]}\n    return text",
+                "import signal\ndef responder(text):\n    signal.setitimer(signal.ITIMER_REAL, 0.9)\n"
+                "    signal.signal(signal.SIGALRM, lambda *_: None)\n    signal.pause()\n    return text",
+                "import select\ndef responder(text):\n    select.poll().poll(900)\n    return text",
+            )
+        ),
     ],
 )
 def test_a_responder_sleeps_at_the_expense_of_all_trials(responder: str, runner: TrialRunner) -> None:

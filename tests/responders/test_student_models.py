@@ -45,7 +45,13 @@ def graded(folder: Path, runner: TrialRunner) -> Grade:
     return grade(read_submission(folder, required_parts=assignment.parts), assignment, runner=runner)
 
 
-@pytest.mark.parametrize("name", sorted(EXPECTED))
+#: A long test: the file takes seconds to write and to read.
+_LARGE = "weights-of-two-gigabytes"
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name == _LARGE)) for name in sorted(EXPECTED)]
+)
 def test_a_model_gets_marks_or_a_sentence(name: str, runner: TrialRunner) -> None:
     wanted = EXPECTED[name]
     result = graded(FOLDER / name, runner)

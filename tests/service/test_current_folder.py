@@ -83,8 +83,8 @@ COMMANDS = {
 }
 
 
-#: Long tests: commands that start no service and differ only in their imports.
-_LONG = ("check an assignment", "floors", "list batches")
+#: Long tests: commands that start no service and differ from others only in their imports.
+_LONG = ("check an assignment", "floors", "grade", "grade the folder", "list batches", "run", "sandbox check")
 MARKED = ("grade", "grade with a report", "submit and wait")
 
 

@@ -47,9 +47,30 @@ from submissions.criteria.texts import TextSequence
 from submissions.stored_submission import pack_submission, unpack_submission
 from submissions.submission import Submission
 
-#: Their examples take four fifths of the total time: dozens of trials, minutes on the track, or training.
+#: Their examples take nine tenths of the total time: dozens of trials, minutes on the track, or training.
 _LONG = frozenset(
     {
+        "black-or-grey",
+        "bounding-boxes",
+        "braitenberg-seek",
+        "calibrate-on-lollipop",
+        "colour-under-sensor",
+        "digit-column",
+        "drive-into-range",
+        "grey-band-readings",
+        "image-parser",
+        "json-queue",
+        "log-bands",
+        "parser-agent-and-logger",
+        "relay-a-message",
+        "sensor-diameters",
+        "shape-recognition",
+        "stay-inside",
+        "three-greys",
+        "track-width",
+        "turn-until-answered",
+        "two-sensor-line-follower",
+        "ultrasonic-stop",
         "braitenberg-avoid",
         "collect-shapes",
         "dead-reckoning-with-noise",

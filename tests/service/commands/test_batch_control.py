@@ -120,6 +120,7 @@ def test_each_change_is_one_sentence(graded: tuple[Path, Path, Ended], tmp_path:
         assert (ended.status, sentence in ended.out + ended.err) == (status, True), (words, ended)
 
 
+@pytest.mark.long
 def test_a_worker_honours_pause_and_cancel(tmp_path: Path) -> None:
     settings = settings_in(asked_already(tmp_path), concurrency=1)
     with open_store(settings) as store, EmbeddedServices(settings, store) as services:

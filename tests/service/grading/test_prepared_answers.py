@@ -138,11 +138,10 @@ ATTACKED = {
     "shapes-off-centre": STANDS,
     "shapes-on-the-move": DRIVES,
 }
-_QUICK = "rules-without-a-network"
-_LONG = [name if name == _QUICK else pytest.param(name, marks=pytest.mark.long) for name in ATTACKED]
 
 
-@pytest.mark.parametrize("name", _LONG)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ATTACKED)
 def test_a_table_made_at_home_earns_nothing(runner: TrialRunner, name: str) -> None:
     assignment, program = marked(name), ATTACKED[name]
     offered = sum(criterion.marks for criterion in assignment.criteria)

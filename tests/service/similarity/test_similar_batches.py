@@ -71,7 +71,8 @@ def _compared(programs: Mapping[str, str], runner: TrialRunner, trials: int) -> 
     return compare_submissions(ASSIGNMENT.id, sources, collect_given_code(ASSIGNMENT), behaviours)
 
 
-@pytest.mark.parametrize("trials", [pytest.param(1, marks=pytest.mark.long), 2])
+@pytest.mark.long
+@pytest.mark.parametrize("trials", [1, 2])
 def test_a_copy_that_was_rewritten_is_found_by_its_path_and_its_recordings(runner: TrialRunner, trials: int) -> None:
     original = EDGE_FOLLOWER.format(speed=17, gain=0.37, edge=46)
     similarity = _compared({**_edge_followers(8), "ada": original, "eva": WRAPPED}, runner, trials)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from sqlalchemy import event
 from starlette.testclient import TestClient
 
@@ -39,6 +40,7 @@ _READERS = {
 _NO_STATEMENT = re.compile("BEGIN|PRAGMA")
 
 
+@pytest.mark.long
 def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(tmp_path: Path) -> None:
     with web_in(tmp_path) as web:
         world = make_world(web)
