@@ -87,7 +87,7 @@ def _ask_for_code_cell(position: int) -> Sentence:
 
 #: Lines of a robot program, which a cell of the responder does not have.
 _ROBOT_CODE = re.compile(
-    r"^\s*(?:tank_(?:drive|turn)\.|say\(|print\(f?[\"'](?:PY::|IMG_DATA)|(?:from|import) ev3dev2)", re.MULTILINE
+    r"^[ \t]*(?:tank_(?:drive|turn)\.|say\(|print\(f?[\"'](?:PY::|IMG_DATA)|(?:from|import) ev3dev2)", re.MULTILINE
 )
 _RESPONDER_CODE = re.compile(r"^def (?:\w+_)?responder\(|\bpyresponder\b", re.MULTILINE)
 

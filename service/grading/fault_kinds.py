@@ -26,7 +26,7 @@ class FaultKind(Enum):
     UNEXPECTED_KEYWORD = r"^TypeError: (?:\w+\.)*(\w+)\(\) got an unexpected keyword argument '(\w+)'"
     TEXT_OPERAND = (
         r"^TypeError: (?:unsupported operand type\(s\) for |'[<>=]+' not supported between |can only concatenate )"
-        r".*str"
+        r".*\bstr\b"
     )
     LIST_OPERAND = r"^TypeError: .*(?:'list'|can't multiply sequence|can only concatenate list)"
     TUPLE_OPERAND = r"^TypeError: .*\btuple\b"

@@ -215,7 +215,7 @@ def find_link_owner(session: Session, link: str) -> LinkOwner | None:
     query = select(Enrolment.name, Enrolment.written).where(Enrolment.person_id == row.person_id)
     if row.course_id is not None:
         query = query.where(Enrolment.course_id == row.course_id)
-    names = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).tuples().all()
+    names = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
     return LinkOwner(row.person_id, _choose_name(row.person_id, names), row.expires_at)
 
 
