@@ -41,6 +41,7 @@ def _cells(file: Path) -> Iterator[tuple[str, str]]:
             yield f"{file.name}, cell {number}", "".join(cell["source"])
 
 
+@pytest.mark.long
 def test_there_is_no_slip_in_programs_that_are_right() -> None:
     slips_by_name = {name: slips for name, text in sources() if (slips := list(collect_slips(listing(text, name))))}
     assert slips_by_name == {}

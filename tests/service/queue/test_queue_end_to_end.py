@@ -110,6 +110,7 @@ def _spinning(count: int) -> list[GradingRequest]:
     return [grading_request(f"spinner-{number}", SPIN) for number in range(count)]
 
 
+@pytest.mark.long
 def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, runner: TrialRunner) -> None:
     checked = read_named_batch(locate_examples("echo-responder"), "echo-responder")
     assert checked.refusals == ()
