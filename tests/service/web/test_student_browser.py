@@ -111,7 +111,7 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     follow(grace.get_by_role("link", name="Appeals 1"))
     assert_in_order(grace)
     grace.get_by_label("Answer").fill("No, the red one alone.")
-    grace.get_by_role("button", name="Answer").click()
+    grace.get_by_role("button", name="Send answer").click()
     expect(grace.locator("main")).to_contain_text("No open appeals.")
     expect(grace.get_by_role("link", name="Appeals")).to_have_text("Appeals")
     page.reload()
