@@ -319,4 +319,4 @@ def test_a_worker_that_waits_for_a_processor_itself_calls_nobody_asleep(tmp_path
             each.kill()
             each.wait()
     assert ended.returncode == 0
-    assert "time_limit" in ended.stdout
+    assert "still running at the end" in ended.stdout
