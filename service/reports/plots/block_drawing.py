@@ -54,9 +54,6 @@ def draw_blocks(diagram: Diagram, title: str, subtitle: str, highlights: Highlig
     layout = _compute_page_layout(diagram)
     figure = create_figure(HEAD + layout.height + _FOOT, title, subtitle, layout.width)
     axes = add_axes(figure, 0, _FOOT, layout.width, layout.height)
-    axes.set_axis_off()
-    axes.set_xlim(0, layout.width)
-    axes.set_ylim(0, layout.height)
     width, height = layout.box
     for group in diagram.groups:
         member_centres = [layout.centres[name] for name in group.members]

@@ -69,9 +69,6 @@ def draw_sequence(diagram: Diagram, title: str, subtitle: str, highlights: Highl
     body_height = top + sum(row.height for row in rows) + 0.16
     figure = create_figure(HEAD - 0.04 + body_height + _FOOT, title, subtitle, width)
     axes = add_axes(figure, 0, _FOOT, width, body_height)
-    axes.set_axis_off()
-    axes.set_xlim(0, width)
-    axes.set_ylim(0, body_height)
     for group in diagram.groups:
         member_positions = [lanes[name] for name in group.members]
         if member_positions:

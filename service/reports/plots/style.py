@@ -90,20 +90,13 @@ def write_text(
 
 
 def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Return axes at a rectangle in inches, with thin rules and small type."""
+    """Return axes without ticks and frame at a rectangle. Their coordinates are inches from its lower left corner."""
     figure_width, figure_height = figure.get_size_inches()
     axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
-    for side in axes.spines.values():
-        side.set_color(RULE)
-        side.set_linewidth(0.8)
-    axes.tick_params(color=RULE, labelcolor=INK, length=3, width=0.8, pad=2)
-    set_tick_size(axes)
+    axes.set_axis_off()
+    axes.set_xlim(0, width)
+    axes.set_ylim(0, height)
     return axes
-
-
-def set_tick_size(axes: Axes, size: float = 8) -> None:
-    """Set the size of the tick labels, in points."""
-    axes.tick_params(labelsize=max(size, MIN_FONT_SIZE), labelfontfamily="DejaVu Sans")
 
 
 @lru_cache(maxsize=64)
