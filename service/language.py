@@ -27,9 +27,9 @@ class Language:
         """Translate a sentence. ``%(name)s`` is replaced by a part, and ``%%`` by a per cent sign."""
         return self.catalogue.gettext(sentence) % parts
 
-    def translate_sentence(self, sentence: str | Sentence) -> str:
-        """Translate a sentence created elsewhere, including nested sentences."""
-        if isinstance(sentence, str):
+    def translate_sentence(self, sentence: str) -> str:
+        """Translate a sentence created elsewhere, including nested sentences. Other text stays as it is."""
+        if not isinstance(sentence, Sentence):
             return sentence
         if not sentence.values:
             return self.catalogue.gettext(sentence.template) if sentence.template else ""

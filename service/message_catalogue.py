@@ -21,7 +21,7 @@ _TRANSLATED_SOURCES = [
     ("web/**.py", "python"),
     ("reports/**.py", "python"),
     ("operations/**.py", "python"),
-    ("grading/verdict_labels.py", "python"),
+    ("grading/**.py", "python"),
 ]
 #: Sources of translated errors about submissions: the code that raises them does not know the reader.
 _ERROR_SOURCES = [

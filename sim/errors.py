@@ -16,8 +16,8 @@ class RobomarkError(Exception):
     With values, the text is a template as in ``Sentence``.
     """
 
-    def __init__(self, sentence: str | Sentence = "", /, **values: object) -> None:
-        self.message = Sentence(sentence, values) if isinstance(sentence, str) else sentence
+    def __init__(self, sentence: str = "", /, **values: object) -> None:
+        self.message = Sentence(sentence, **values) if isinstance(sentence, str) else sentence
         super().__init__(str(self.message))
 
 

@@ -77,7 +77,7 @@ def read_submission(path: Path, *, student: str | None = None, required_parts: P
     else:
         advice = advise_on_kind([path.name])
         if advice is not None:
-            raise UsageError(Sentence("%(advice)s.", {"advice": advice}))
+            raise UsageError(Sentence("%(advice)s.", advice=advice))
         raise UsageError(
             "%(where)s: is of a kind that cannot be read, expected a .py file, a notebook, a folder or a .zip.",
             where=source_name,
@@ -176,11 +176,7 @@ def _find_notebook(files: dict[str, bytes], source_name: str, notes: list[str]) 
     except UsageError as error:
         # Errors name the notebook, and one in a folder may have the folder's name.
         has_prefix = len(names) > 1 or sanitise_name(names[0]).startswith(source_name)
-        sentence = (
-            error.message
-            if has_prefix
-            else Sentence("%(where)s: %(why)s", {"where": source_name, "why": error.message})
-        )
+        sentence = error.message if has_prefix else Sentence("%(where)s: %(why)s", where=source_name, why=error.message)
         if not parts:
             raise UsageError(sentence) from None
         # The .py file beside it may contain the requested parts. Names of downloads can contain the student's.
@@ -230,7 +226,7 @@ def _find_parts(
         return guessed_parts
     found_names = ", ".join(sanitise_name(name) for name in sorted(files)[:5])
     advice = advise_on_kind(sorted(files))
-    kind_advice = Sentence("; %(advice)s", {"advice": advice}) if advice is not None else ""
+    kind_advice = Sentence("; %(advice)s", advice=advice) if advice is not None else ""
     rename_advice = advise_on_names(PART_FILES, files) or kind_advice
     raise UsageError(
         "%(where)s: has no robot.py or responder.py (found %(found)s), expected one or both%(renamed)s.",

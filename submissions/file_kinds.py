@@ -60,7 +60,7 @@ def advise_on_kind(names: Iterable[str]) -> Sentence | None:
         file_kind = _KINDS.get(PurePosixPath(name.lower()).suffix)
         if file_kind is not None:
             values = {"name": sanitise_name(name), "kind": file_kind[0], "advice": file_kind[1]}
-            return Sentence("%(name)s is %(kind)s, not a program: %(advice)s", values)
+            return Sentence("%(name)s is %(kind)s, not a program: %(advice)s", **values)
     return None
 
 
@@ -73,15 +73,15 @@ def find_similar_file(part: Part, names: Iterable[str]) -> str:
     return next((name for name, stem in stems.items() if stem_name in stem or stem in matches), "")
 
 
-def advise_on_names(missing_parts: Iterable[Part], files: Iterable[str]) -> str | Sentence:
+def advise_on_names(missing_parts: Iterable[Part], files: Iterable[str]) -> str:
     """Return advice to rename similar files to the missing parts; empty if no name is similar."""
     similar_files = {part: find_similar_file(part, files) for part in missing_parts}
     renames = [
-        Sentence("%(name)s to %(part)s", {"name": sanitise_name(name), "part": PART_FILES[part]})
+        Sentence("%(name)s to %(part)s", name=sanitise_name(name), part=PART_FILES[part])
         for part, name in similar_files.items()
         if name
     ]
-    return Sentence("; rename %(files)s", {"files": join_with_and(renames)}) if renames else ""
+    return Sentence("; rename %(files)s", files=join_with_and(renames)) if renames else ""
 
 
 def is_compiled(name: str, data: bytes) -> bool:

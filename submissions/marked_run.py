@@ -271,4 +271,4 @@ def _parse_floor(line: str, restart_flags: re.Match[str] | None, is_first_line: 
 def _format_count(number: int) -> Sentence:
     if number == 1:
         return Sentence("1 robot program")
-    return Sentence("%(count)s robot programs", {"count": number})
+    return Sentence("%(count)s robot programs", count=number)

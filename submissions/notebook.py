@@ -81,7 +81,7 @@ def _ask_for_code_cell(position: int) -> Sentence:
     """Return a sentence that asks for a code cell, for a robot program in a Markdown cell."""
     return Sentence(
         "cell %(place)s from the top has a robot program, but is a Markdown cell. Change it to a code cell",
-        {"place": position},
+        place=position,
     )
 
 
@@ -92,10 +92,10 @@ _ROBOT_CODE = re.compile(
 _RESPONDER_CODE = re.compile(r"^def (?:\w+_)?responder\(|\bpyresponder\b", re.MULTILINE)
 
 
-def describe_near_program(notebook: Notebook) -> str | Sentence:
+def describe_near_program(notebook: Notebook) -> str:
     """Describe a line that is almost a program's magic, or is one in the wrong place such as a Markdown cell."""
     for position in notebook.markdown_programs:
-        return Sentence("; %(near)s", {"near": _ask_for_code_cell(position)})
+        return Sentence("; %(near)s", near=_ask_for_code_cell(position))
     for cell in notebook.cells:
         for number, line in enumerate(cell.source.split("\n"), 1):
             match = _BEGIN.search(line[:200]) if NEARLY_MAGIC.match(line[:200]) else None
@@ -106,12 +106,13 @@ def describe_near_program(notebook: Notebook) -> str | Sentence:
                     "word": sanitise_name(match[0]),
                     "why": _explain_near_magic(line),
                 }
-                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", values)
+                return Sentence("; line %(line)s of cell %(cell)s has %(word)s, %(why)s", **values)
     for cell in notebook.cells:
         if _ROBOT_CODE.search(cell.source) and not _RESPONDER_CODE.search(cell.source):
             return Sentence(
                 "; cell %(cell)s looks like one: write %(magic)s as its first line",
-                {"cell": cell.number, "magic": "%%sim_magic_preloaded"},
+                cell=cell.number,
+                magic="%%sim_magic_preloaded",
             )
     return ""
 
@@ -121,9 +122,9 @@ def _explain_near_magic(line: str) -> Sentence:
     if is_program_magic(line):
         return Sentence("below other code: make it the first line")
     if is_program_magic(f"%{line.lstrip()}"):
-        return Sentence("with one %(sign)s: write two", {"sign": "%"})
+        return Sentence("with one %(sign)s: write two", sign="%")
     if is_program_magic(re.sub(r"^%%\s+", "%%", line.strip())):
-        return Sentence("with a blank after %(signs)s: delete the blank", {"signs": "%%"})
+        return Sentence("with a blank after %(signs)s: delete the blank", signs="%%")
     return Sentence("another word")
 
 
@@ -203,7 +204,7 @@ def _parse_document(text: str, name: str) -> Mapping[str, Any]:
         ) from None
     except ValueError as error:
         line = error.lineno if isinstance(error, JSONDecodeError) else None
-        location = "" if line is None else Sentence(" (line %(line)s)", {"line": line})
+        location = "" if line is None else Sentence(" (line %(line)s)", line=line)
         raise UsageError(
             "%(name)s: is not a notebook: its JSON is broken%(where)s, expected one saved by Jupyter.",
             name=name,

@@ -185,4 +185,4 @@ def _collect_written_agents(notebook: Notebook, agents: Mapping[str, str]) -> di
 
 
 def _describe_file(file: str, description: Sentence) -> Sentence:
-    return Sentence("%(file)s (%(what)s)", {"file": file, "what": description})
+    return Sentence("%(file)s (%(what)s)", file=file, what=description)

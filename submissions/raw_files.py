@@ -96,7 +96,7 @@ class _Budget:
             "most": MAX_FILE_BYTES // MEGABYTE,
             "advice": Sentence("; clear its outputs before you save it") if notebook else "",
         }
-        return Sentence("%(what)s is too large, expected at most %(most)s MB a file%(advice)s.", values)
+        return Sentence("%(what)s is too large, expected at most %(most)s MB a file%(advice)s.", **values)
 
 
 def _format_location(source_name: str, name: str) -> str:

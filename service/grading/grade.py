@@ -5,14 +5,15 @@ This module contains data only. ``judge.py`` and ``grader.py`` create grades; re
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
 from responders.sandbox.meter import JobCosts, JobLimits
 from service.grading.findings import Finding
 from sim.recording import Image, Pose, Recording, Verdict
 from sim.recording_values import decide_verdict
+from sim.sentences import Sentence
 from submissions.seeds import PUBLIC_SECRET
 
 
@@ -264,4 +265,26 @@ class Grade:
 def build_unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
-    return (f"{count} of {len(criteria)} criteria could not be judged; staff will review them",) if count else ()
+    note = "%(count)s of %(criteria)s criteria could not be judged; staff will review them"
+    return (Sentence(note, count=count, criteria=len(criteria)),) if count else ()
+
+
+def convert_texts(grade: Grade, convert: Callable[[str], str]) -> Grade:
+    """Return the grade with every text that Robomark wrote converted: notes, hints, and those of the criteria."""
+    return replace(
+        grade,
+        criteria=tuple(_convert_result(result, convert) for result in grade.criteria),
+        notes=tuple(convert(note) for note in grade.notes),
+        hints=tuple(convert(hint) for hint in grade.hints),
+    )
+
+
+def _convert_result(result: CriterionResult, convert: Callable[[str], str]) -> CriterionResult:
+    return replace(
+        result,
+        message=convert(result.message),
+        evidence=tuple(replace(each, message=convert(each.message)) for each in result.evidence),
+        shown=None if result.shown is None else replace(result.shown, message=convert(result.shown.message)),
+        unjudged=convert(result.unjudged),
+        for_staff=convert(result.for_staff),
+    )

@@ -217,7 +217,7 @@ def _enrol_students(session: Session, actor: Actor, course_id: int, new_students
 
 def _build_enrolled_error(member: Member) -> Conflict:
     has_name = member.name and member.name != member.id
-    name_note = Sentence(", as %(name)s", {"name": member.name}) if has_name else ""
+    name_note = Sentence(", as %(name)s", name=member.name) if has_name else ""
     if member.role is Role.INSTRUCTOR:
         return Conflict(
             "%(id)s is an instructor of this course%(called)s; expected the ID of a student.",

@@ -80,9 +80,9 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     failed_criteria = {index: each for index, each in automatic_criteria.items() if each.marks < each.max_marks}
     if is_not_students_fault(grade.verdict):
         return Diagnosis(verdict_words.happened, verdict_words.next_step)
-    hints = format_hints(grade)
+    hints = format_hints(grade, language)
     if grade.criteria and grade.marks >= grade.max_marks:
-        return _diagnose_full_marks(hints, submission, language)
+        return _diagnose_full_marks(grade, hints, submission, language)
     if hints:
         return _diagnose_hint(grade, hints, failed_criteria, submission, language)
     fault = _find_costly_fault(grade, failed_criteria)
@@ -100,7 +100,9 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     )
 
 
-def _diagnose_full_marks(hints: tuple[str, ...], submission: Submission | None, language: Language) -> Diagnosis:
+def _diagnose_full_marks(
+    grade: Grade, hints: tuple[str, ...], submission: Submission | None, language: Language
+) -> Diagnosis:
     """Return the diagnosis for full marks, with what was accepted although it differs from the assignment."""
     full_marks_text = language.say(FULL_MARKS)
     if not hints:
@@ -110,7 +112,7 @@ def _diagnose_full_marks(hints: tuple[str, ...], submission: Submission | None, 
         full=full_marks_text,
         difference=hints[0],
     )
-    place_match = _PLACE.match(hints[0])
+    place_match = _PLACE.match(grade.hints[0])
     excerpt = _build_excerpt(submission, place_match[2], int(place_match[1])) if place_match is not None else None
     step = language.say("No changes needed for the marks. Correct this if others use your program.")
     return Diagnosis(cause, step, hints[1:], excerpt)
@@ -123,10 +125,8 @@ def _diagnose_hint(
     submission: Submission | None,
     language: Language,
 ) -> Diagnosis:
-    hint = hints[0]
-    fault = next(
-        (each for each in _iterate_faults(grade) if to_display_text(each.message, 200).rstrip(".") in hint), None
-    )
+    hint = grade.hints[0]  # in English; ``hints`` are in the reader's language
+    fault = next((each for each in _iterate_faults(grade) if each.message[:200].rstrip(".") in hint), None)
     if fault is not None:
         affected_criteria = _find_affected_criteria(grade, fault, failed_criteria)
     elif _NEAR_MISS.search(hint):
@@ -139,14 +139,14 @@ def _diagnose_hint(
     place_match = _PLACE.match(hint)
     if place_match is None:
         step = language.say("Fix this first, then submit again.")
-        return Diagnosis(hint, step, hints[1:], lost=affected_criteria)
+        return Diagnosis(hints[0], step, hints[1:], lost=affected_criteria)
     line, name = int(place_match[1]), place_match[2]
     step = language.say(
         "Fix line %(line)s of %(file)s, run it without submitting, then submit again.",
         line=line,
         file=name,
     )
-    return Diagnosis(hint, step, hints[1:], _build_excerpt(submission, name, line), lost=affected_criteria)
+    return Diagnosis(hints[0], step, hints[1:], _build_excerpt(submission, name, line), lost=affected_criteria)
 
 
 def _diagnose_fault(

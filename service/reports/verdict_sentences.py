@@ -296,9 +296,9 @@ def format_trial_name(trial: TrialResult, language: Language = ENGLISH, max_leng
     return language.say("%(scenario)s, trial %(number)s", scenario=scenario, number=trial.index + 1)
 
 
-def format_hints(grade: Grade) -> tuple[str, ...]:
+def format_hints(grade: Grade, language: Language = ENGLISH) -> tuple[str, ...]:
     """Return the likely causes of lost marks as sentences that are safe to show, before anything else."""
-    hint_texts = (to_display_text(hint, 600).rstrip(".") for hint in grade.hints)
+    hint_texts = (to_display_text(language.translate_sentence(hint), 600).rstrip(".") for hint in grade.hints)
     # A file name keeps its case.
     capitalised_hints = (hint if "." in hint.partition(" ")[0] else hint[:1].upper() + hint[1:] for hint in hint_texts)
     return tuple(hint if hint.endswith("?") else f"{hint}." for hint in capitalised_hints)

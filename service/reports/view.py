@@ -13,12 +13,20 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from service.grading.class_statistics import scale_marks
-from service.grading.grade import CriterionResult, Grade, TrialResult, VisibleFeedback, build_unjudged_notes
+from service.grading.grade import (
+    CriterionResult,
+    Grade,
+    TrialResult,
+    VisibleFeedback,
+    build_unjudged_notes,
+    convert_texts,
+)
 from service.grading.judging.message_parts import add_hidden_note
 from service.language import ENGLISH, Language
 from service.reports.verdict_sentences import describe_adjustment
 from sim.errors import UsageError
 from sim.recording import Verdict
+from sim.sentences import join_sentences
 from submissions.assignment.folder import REFERENCE
 
 if TYPE_CHECKING:
@@ -86,7 +94,7 @@ def build_similarity_view(similarities: Sequence[Similarity], language: Language
 def build_staff_view(grade: Grade, language: Language = ENGLISH) -> View:
     """Return the view of a grade for staff, with all its data."""
     criteria = tuple(_add_adjustment(result, language) for result in grade.criteria)
-    return View(replace(grade, criteria=criteria), staff=True, withheld=False, language=language)
+    return View(_translate(replace(grade, criteria=criteria), language), staff=True, withheld=False, language=language)
 
 
 def build_student_view(
@@ -116,7 +124,7 @@ def build_student_view(
         comments=tuple(each for each in grade.comments if visible_ids and each.criterion in ("", *visible_ids)),
     )
     withheld = len(visible_grade.criteria) < len(grade.criteria) or len(visible_grade.trials) < len(grade.trials)
-    return View(visible_grade, staff=False, withheld=withheld, language=language)
+    return View(_translate(visible_grade, language), staff=False, withheld=withheld, language=language)
 
 
 def _select_notes(grade: Grade, visible_ids: Set[str]) -> tuple[str, ...]:
@@ -211,9 +219,16 @@ def _limit_text(grade: Grade, result: CriterionResult) -> CriterionResult:
     return replace(view.grade.criteria[0], evidence=(), predictions=())
 
 
+def _translate(grade: Grade, language: Language) -> Grade:
+    """Return the grade with its texts in this language, except hints: the diagnosis reads them first."""
+    if language is ENGLISH:
+        return grade
+    return replace(convert_texts(grade, language.translate_sentence), hints=grade.hints)
+
+
 def _add_adjustment(result: CriterionResult, language: Language) -> CriterionResult:
     sentence = describe_adjustment(result, language)
-    return replace(result, message=" ".join(filter(None, (sentence, result.message)))) if sentence else result
+    return replace(result, message=join_sentences(sentence, result.message)) if sentence else result
 
 
 def _rank_severity(trial: TrialResult) -> int:

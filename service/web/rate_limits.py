@@ -45,7 +45,7 @@ class RateLimit:
 
     def _refuse(self, remaining: float) -> NoReturn:
         seconds = max(1, round((1 - remaining) / self._per_second))
-        message = Sentence("Too many requests. Try again in %(seconds)s s.", {"seconds": seconds})
+        message = Sentence("Too many requests. Try again in %(seconds)s s.", seconds=seconds)
         raise TranslatableHTTPException(429, message, {"retry-after": str(seconds)})
 
 

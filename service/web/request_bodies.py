@@ -45,7 +45,7 @@ class BodyTooLarge(TranslatableHTTPException):
 
     def __init__(self, max_bytes: int) -> None:
         amount = f"{max_bytes // MEGABYTE} MB" if max_bytes >= MEGABYTE else f"{max_bytes // 1024} kB"
-        super().__init__(413, Sentence("The request is too large. The limit is %(limit)s.", {"limit": amount}))
+        super().__init__(413, Sentence("The request is too large. The limit is %(limit)s.", limit=amount))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from service.message_catalogue import extract_messages, locate_catalogue, update
 from web import submit, web_in
 
 OTHERS = [code for code in list_languages() if code != SOURCE_LANGUAGE]
-_PLACES = re.compile(r"%\(\w+\)[sd]|<[^>]+>")
+_PLACES = re.compile(r"%\(\w+\)[\d.]*[a-z]|<[^>]+>")
 
 
 @pytest.mark.parametrize("code", OTHERS)

@@ -6,7 +6,9 @@ Faults of the responder don't end a program, so this module ignores them.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,9 +18,20 @@ from service.grading.judging.geometry import measure_area_distance
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import describe_fault, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
+from service.language import translatable
 from sim.recording import Fault, Recording, Verdict
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence
 from submissions.criteria.ending import EndPose, Finishes, SinceEvent
+
+_EVENTS: Mapping[str, str] = MappingProxyType(
+    {
+        "sent": translatable("%(text)s was sent"),
+        "answered": translatable("%(text)s was answered"),
+        "said": translatable("%(text)s was said"),
+        "printed": translatable("%(text)s was printed"),
+    }
+)
 
 
 @declare_judge(Finishes)
@@ -28,32 +41,35 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     fault = find_ending_fault(recording)
     measures = (Measure("time", recording.end_t, "s"),)
     if fault is not None:
-        message = f"Expected the program to end by itself, but {_describe_end(fault)}."
+        message = Sentence("Expected the program to end by itself, but %(end)s.", end=_describe_end(fault))
         outcome = fail_with(message, fault.t, recording.end, measures=measures, findings=(ReportedFault(fault),))
         return replace(outcome, has_end_reason=True)
     if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:
         return fail_with(
-            f"Expected the program to end within {criterion.seconds:g} s, but it took {recording.end_t:.2f} s.",
+            Sentence(
+                "Expected the program to end within %(limit)g s, but it took %(seconds).2f s.",
+                limit=criterion.seconds,
+                seconds=recording.end_t,
+            ),
             recording.end_t,
             recording.end,
             measures=measures,
         )
-    return pass_with(
-        f"The program ended by itself after {recording.end_t:.2f} s.", recording.end_t, recording.end, measures
-    )
+    message = Sentence("The program ended by itself after %(seconds).2f s.", seconds=recording.end_t)
+    return pass_with(message, recording.end_t, recording.end, measures)
 
 
 def _describe_end(fault: Fault) -> str:
     if fault.verdict is Verdict.TIME_LIMIT:
         return describe_fault(fault)
-    return f"after {fault.t:.2f} s: {describe_fault(fault)}"
+    return Sentence("after %(seconds).2f s: %(fault)s", seconds=fault.t, fault=describe_fault(fault))
 
 
 @declare_judge(EndPose)
 def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     """Judge the end pose. Distances are in mm, angles in degrees modulo 360; the edges belong to a zone."""
     end, t = trial.recording.end, trial.recording.end_t
-    pose_text = f"({end.x:.1f}, {end.y:.1f}) facing {end.heading % 360:.1f}°"
+    pose_text = Sentence("(%(x).1f, %(y).1f) facing %(heading).1f°", x=end.x, y=end.y, heading=end.heading % 360)
     measures = (
         Measure("end x", end.x, "mm"),
         Measure("end y", end.y, "mm"),
@@ -65,8 +81,15 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         distance = math.hypot(end.x - criterion.x, end.y - criterion.y)
         if not distance <= criterion.tolerance:
             return fail_with(
-                f"Expected the robot to end within {criterion.tolerance:g} mm of ({criterion.x:g}, {criterion.y:g}), "
-                f"but it ended at {pose_text}, {distance:.1f} mm away.",
+                Sentence(
+                    "Expected the robot to end within %(tolerance)g mm of (%(x)g, %(y)g), but it ended at %(pose)s, "
+                    "%(distance).1f mm away.",
+                    tolerance=criterion.tolerance,
+                    x=criterion.x,
+                    y=criterion.y,
+                    pose=pose_text,
+                    distance=distance,
+                ),
                 t,
                 end,
                 measures=measures,
@@ -75,8 +98,15 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         left, bottom, right, top = criterion.zone
         if not (left <= end.x <= right and bottom <= end.y <= top):
             return fail_with(
-                f"Expected the robot to end with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}, "
-                f"but it ended at {pose_text}.",
+                Sentence(
+                    "Expected the robot to end with x from %(left)g to %(right)g and y from %(bottom)g to %(top)g, "
+                    "but it ended at %(pose)s.",
+                    left=left,
+                    right=right,
+                    bottom=bottom,
+                    top=top,
+                    pose=pose_text,
+                ),
                 t,
                 end,
                 measures=measures,
@@ -85,10 +115,18 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         gaps = [float(measure_area_distance(area, np.array([[end.x, end.y]]))[0]) for area in criterion.areas]
         if not min(gaps) <= 0:
             nearest_area = criterion.areas[gaps.index(min(gaps))]
-            area_clause = "in" if len(gaps) == 1 else f"in one of {len(gaps)} areas, the nearest being"
+            template = (
+                translatable(
+                    "Expected the robot to end in %(area)s, but it ended at %(pose)s, %(distance).0f mm outside."
+                )
+                if len(gaps) == 1
+                else translatable(
+                    "Expected the robot to end in one of %(count)s areas, the nearest being %(area)s, but it ended at "
+                    "%(pose)s, %(distance).0f mm outside."
+                )
+            )
             return fail_with(
-                f"Expected the robot to end {area_clause} {nearest_area}, but it ended at {pose_text}, "
-                f"{min(gaps):.0f} mm outside.",
+                Sentence(template, count=len(gaps), area=str(nearest_area), pose=pose_text, distance=min(gaps)),
                 t,
                 end,
                 measures=measures,
@@ -97,35 +135,48 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
         heading_error = abs((end.heading - criterion.heading + 180) % 360 - 180)
         if not heading_error <= criterion.heading_tolerance:
             return fail_with(
-                f"Expected the robot to end facing {criterion.heading:g}° within {criterion.heading_tolerance:g}°, "
-                f"but it ended at {pose_text}, {heading_error:.1f}° off.",
+                Sentence(
+                    "Expected the robot to end facing %(heading)g° within %(tolerance)g°, but it ended at %(pose)s, "
+                    "%(error).1f° off.",
+                    heading=criterion.heading,
+                    tolerance=criterion.heading_tolerance,
+                    pose=pose_text,
+                    error=heading_error,
+                ),
                 t,
                 end,
                 measures=measures,
             )
     if criterion.since is not None and (problem := _check_since(criterion.since, trial.recording)):
         return fail_with(problem, t, end, measures=measures)
-    return pass_with(f"The robot ended at {pose_text}.", t, end, measures)
+    return pass_with(Sentence("The robot ended at %(pose)s.", pose=pose_text), t, end, measures)
 
 
 def _check_since(event: SinceEvent, recording: Recording) -> str:
     """Return the problem with the distance or time since the event; empty if there is none."""
     event_time = next((t for t, text in _collect_texts(event, recording) if event.contains in text), None)
-    event_text = f"{quote_text(event.contains)} was {event.of}"
+    event_text = Sentence(_EVENTS[event.of], text=quote_text(event.contains))
     if event_time is None:
-        return f"Expected that {event_text}, but it never was."
+        return Sentence("Expected that %(event)s, but it never was.", event=event_text)
     event_pose, end = get_pose_at(recording, event_time), recording.end
     distance = math.hypot(end.x - event_pose.x, end.y - event_pose.y)
     if event.moved is not None and not event.moved[0] <= distance <= event.moved[1]:
-        return (
-            f"Expected the robot to end {event.moved[0]:g} to {event.moved[1]:g} mm from where it was when "
-            f"{event_text}, but it ended {distance:.1f} mm away."
+        return Sentence(
+            "Expected the robot to end %(least)g to %(most)g mm from where it was when %(event)s, but it ended "
+            "%(distance).1f mm away.",
+            least=event.moved[0],
+            most=event.moved[1],
+            event=event_text,
+            distance=distance,
         )
     seconds = recording.end_t - event_time
     if event.seconds is not None and not event.seconds[0] - 1e-9 <= seconds <= event.seconds[1] + 1e-9:
-        return (
-            f"Expected the program to end {event.seconds[0]:g} to {event.seconds[1]:g} s after {event_text}, "
-            f"but it ended {seconds:.2f} s after."
+        return Sentence(
+            "Expected the program to end %(least)g to %(most)g s after %(event)s, but it ended %(seconds).2f s after.",
+            least=event.seconds[0],
+            most=event.seconds[1],
+            event=event_text,
+            seconds=seconds,
         )
     return ""
 

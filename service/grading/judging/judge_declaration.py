@@ -12,9 +12,10 @@ from typing import Any, TypeVar
 
 from responders.function_calls import CallResult, CallResults
 from service.grading.grade import CriterionResult, Evidence, TrialResult, VisibleFeedback
-from service.grading.judging.message_parts import add_hidden_note, describe_early_end, describe_place
+from service.grading.judging.message_parts import add_hidden_note, add_place, describe_early_end, describe_place
 from service.grading.judging.outcome import Outcome, combine_outcomes, compute_marks, round_to_steps
 from service.grading.judging.source_answers import SourceAnswers
+from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 from submissions.magics import Flags
@@ -101,12 +102,14 @@ def summarise_trials(trials: IndexedTrials, outcomes: Sequence[Outcome]) -> str:
     count = len(outcomes)
     passes = sum(outcome.passed for outcome in outcomes)
     if count and passes == count:
-        return outcomes[0].message if count == 1 else f"As expected in all {count} trials."
-    tally = f"{passes} of {count} trials went as expected. " if count != 1 else ""
+        return outcomes[0].message if count == 1 else Sentence("As expected in all %(count)s trials.", count=count)
+    tally_sentence = "%(passes)s of %(count)s trials went as expected."
+    tally = Sentence(tally_sentence, passes=passes, count=count) if count != 1 else ""
     for (_, trial), outcome in zip(trials, outcomes, strict=True):
         if not outcome.passed:
-            return f"{tally}{describe_place(trial, outcome.t)}: {outcome.message}{describe_early_end(trial, outcome)}"
-    return tally.strip()
+            located_message = add_place(describe_place(trial, outcome.t), outcome.message)
+            return join_sentences(tally, located_message, describe_early_end(trial, outcome))
+    return tally
 
 
 def judge_by_trial(

@@ -5,10 +5,12 @@ The modules of the families write the messages themselves.
 
 from __future__ import annotations
 
+from typing import Literal
+
 from service.grading.grade import TrialResult
 from service.grading.judging.outcome import Outcome, find_ending_fault
 from sim.recording import Fault, Verdict
-from submissions.sweep import CONDITIONS
+from sim.sentences import Sentence, join_sentences
 
 _MAX_QUOTE_LENGTH = 80
 
@@ -19,10 +21,15 @@ def quote_text(text: str) -> str:
     return f'"{line}"' if len(line) <= _MAX_QUOTE_LENGTH else f'"{line[: _MAX_QUOTE_LENGTH - 3]}..."'
 
 
-def quote_list(texts: tuple[str, ...], conjunction: str = "and") -> str:
+def quote_list(texts: tuple[str, ...], conjunction: Literal["and", "or"] = "and") -> str:
     """Return a list such as ``"a", "b" and "c"``."""
-    quotes = [quote_text(text) for text in texts]
-    return quotes[0] if len(quotes) == 1 else f"{', '.join(quotes[:-1])} {conjunction} {quotes[-1]}"
+    *first_quotes, last_quote = [quote_text(text) for text in texts]
+    if not first_quotes:
+        return last_quote
+    these = ", ".join(first_quotes)
+    if conjunction == "or":
+        return Sentence("%(these)s or %(last)s", these=these, last=last_quote)
+    return Sentence("%(these)s and %(last)s", these=these, last=last_quote)
 
 
 def describe_fault(fault: Fault) -> str:
@@ -35,30 +42,30 @@ def describe_place(trial: TrialResult, t: float | None) -> str:
     """Return a place as ``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
     start = trial.recording.start
     x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
-    clauses = [f"In scenario {trial.scenario}, from ({x}, {y}) facing {heading}°"]
+    start_place = "In scenario %(scenario)s, from (%(x)s, %(y)s) facing %(heading)s°"
+    place: str = Sentence(start_place, scenario=trial.scenario, x=x, y=y, heading=heading)
     if trial.light_noise:
-        clauses.append(f"with light noise {trial.light_noise:g}")
+        place = Sentence("%(place)s, with light noise %(level)g", place=place, level=trial.light_noise)
     if trial.motor_noise:
-        clauses.append(f"with motor noise {trial.motor_noise:g}")
+        place = Sentence("%(place)s, with motor noise %(level)g", place=place, level=trial.motor_noise)
     for condition, level in trial.sweep:
-        if condition in ("loss", "delay") and level:
-            condition_info = CONDITIONS[condition]
-            clauses.append(
-                f"with a {condition_info.words} of {level:g}"
-                + (f" {condition_info.unit}" if condition == "delay" else "")
-            )
-    if t is not None:
-        clauses.append(f"at {t:.2f} s")
-    return ", ".join(clauses)
+        if condition == "loss" and level:
+            place = Sentence("%(place)s, with a message loss of %(level)g", place=place, level=level)
+        if condition == "delay" and level:
+            place = Sentence("%(place)s, with a message delay of %(level)g s", place=place, level=level)
+    return place if t is None else Sentence("%(place)s, at %(seconds).2f s", place=place, seconds=t)
+
+
+def add_place(place: str, message: str) -> str:
+    """Return a message with the place that it is about in front."""
+    return Sentence("%(place)s: %(message)s", place=place, message=message)
 
 
 def add_hidden_note(message: str) -> str:
     """Return the feedback on visible trials with a fixed note that hidden trials are marked as well."""
-    return (
-        f"{message} Trials that are not shown are marked as well."
-        if message
-        else "Marked in trials that are not shown."
-    )
+    if not message:
+        return Sentence("Marked in trials that are not shown.")
+    return join_sentences(message, Sentence("Trials that are not shown are marked as well."))
 
 
 def describe_early_end(trial: TrialResult, outcome: Outcome | None = None) -> str:
@@ -67,5 +74,5 @@ def describe_early_end(trial: TrialResult, outcome: Outcome | None = None) -> st
     if fault is None or (outcome is not None and outcome.has_end_reason):
         return ""
     if fault.verdict is Verdict.TIME_LIMIT:
-        return f" The program was still running when time ran out, at {fault.t:g} s."
-    return f" The run ended early, at {fault.t:.2f} s."
+        return Sentence("The program was still running when time ran out, at %(seconds)g s.", seconds=fault.t)
+    return Sentence("The run ended early, at %(seconds).2f s.", seconds=fault.t)

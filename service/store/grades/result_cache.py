@@ -84,7 +84,7 @@ def build_copied_values(session: Session, source_id: str, job_id: str, current_t
     """Return the column values that a job takes over from a copied grade."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    grade_columns = ("verdict", "sandbox", "grader_version", "missing", "hints", "cost")
+    grade_columns = ("verdict", "sandbox", "grader_version", "missing", "hints", "sentences", "cost")
     names = (*grade_columns, "grader_sha256", "secret_sha256", "cache_key")
     has_plots = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {

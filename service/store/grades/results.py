@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, cast
 
 from sqlalchemy import delete, select
-from sqlalchemy.orm import Session, defer
+from sqlalchemy.orm import Session, defer, undefer
 from sqlalchemy.orm.interfaces import ORMOption
 
 from service.grading.grade import (
@@ -32,6 +32,7 @@ from service.grading.grade import (
 from service.store import artifacts
 from service.store.codec import decode, encode
 from service.store.grades import comments, overrides
+from service.store.grades.grade_sentences import restore_sentences
 from service.store.grades.overrides import OverrideLine
 from service.store.grades.recording_texts import texts_from_bytes
 from service.store.tables.courses import AssignmentVersion
@@ -124,11 +125,11 @@ def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
 
     Reads no recordings. Jobs without a grade are left out.
     """
-    grades_by_job = _load_heads(session, job_ids, defer(CriterionResultRow.predictions))
+    stored_grades = _load_stored_grades(session, job_ids, defer(CriterionResultRow.predictions))
     overrides_by_job = overrides.load_overrides(session, job_ids)
     return {
-        job_id: _apply_overrides(_add_criteria(grade, rows, ()), overrides_by_job.get(job_id, {}))
-        for job_id, (grade, rows) in grades_by_job.items()
+        job_id: _apply_overrides(stored_grade.build_grade(()), overrides_by_job.get(job_id, {}))
+        for job_id, stored_grade in stored_grades.items()
     }
 
 
@@ -168,34 +169,42 @@ def _apply_overrides(grade: Grade, overrides_by_criterion: Mapping[str, Override
 def _load_original_grades(
     session: Session, job_ids: Collection[str], decode_recording: Callable[[bytes], Recording]
 ) -> _LoadedGrades:
-    grades_by_job = _load_heads(session, job_ids)
-    for job_id, trials in _load_trials(session, grades_by_job, decode_recording):
-        yield job_id, _add_criteria(*grades_by_job[job_id], trials)
+    stored_grades = _load_stored_grades(session, job_ids)
+    for job_id, trials in _load_trials(session, stored_grades, decode_recording):
+        yield job_id, stored_grades[job_id].build_grade(trials)
 
 
-def _add_criteria(grade: Grade, rows: Sequence[CriterionResultRow], trials: tuple[TrialResult, ...]) -> Grade:
-    return replace(grade, criteria=tuple(_build_criterion(row, trials) for row in rows), trials=trials)
+@dataclass(frozen=True, slots=True)
+class _StoredGrade:
+    """A grade without criteria and trials, its criterion rows, and its encoded sentences."""
+
+    head: Grade
+    rows: list[CriterionResultRow]
+    sentences: list[Any]
+
+    def build_grade(self, trials: tuple[TrialResult, ...]) -> Grade:
+        criteria = tuple(_build_criterion(row, trials) for row in self.rows)
+        return restore_sentences(replace(self.head, criteria=criteria, trials=trials), self.sentences)
 
 
-def _load_heads(
-    session: Session, job_ids: Collection[str], *options: ORMOption
-) -> dict[str, tuple[Grade, list[CriterionResultRow]]]:
-    """Return the grades without criteria and trials, and the criterion rows, by job."""
+def _load_stored_grades(session: Session, job_ids: Collection[str], *options: ORMOption) -> dict[str, _StoredGrade]:
+    """Return the stored grades by job."""
     query = (
         select(Job, SubmissionRow.sha256, Enrolment.student, AssignmentVersion)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id.in_(job_ids), Job.verdict.is_not(None))
+        .options(undefer(Job.sentences))
     )
-    grades_by_job = {
-        job.id: (_build_head(job, sha256, student, version), list[CriterionResultRow]())
+    stored_grades = {
+        job.id: _StoredGrade(_build_head(job, sha256, student, version), [], job.sentences)
         for job, sha256, student, version in session.execute(query)
     }
-    rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(grades_by_job)).options(*options)
+    rows = select(CriterionResultRow).where(CriterionResultRow.job_id.in_(stored_grades)).options(*options)
     for row in session.scalars(rows.order_by(CriterionResultRow.job_id, CriterionResultRow.position)):
-        grades_by_job[row.job_id][1].append(row)
-    return grades_by_job
+        stored_grades[row.job_id].rows.append(row)
+    return stored_grades
 
 
 def _build_head(job: Job, sha256: str, student: str, version: AssignmentVersion) -> Grade:
@@ -282,7 +291,7 @@ def _build_criterion_row(
         title=result.title,
         marks=result.marks,
         max_marks=result.max_marks,
-        message=result.message,
+        message=str(result.message),
         visibility=result.visibility,
         evidence=encode(result.evidence),
         accuracy=accuracy and accuracy.value,

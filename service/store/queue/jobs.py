@@ -22,6 +22,7 @@ from service.store import outbox, phases
 from service.store.codec import encode
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import overrides, plots, result_cache
+from service.store.grades.grade_sentences import encode_sentences
 from service.store.installation import load_secret
 from service.store.locks import match_and_lock_jobs
 from service.store.queue import workers
@@ -238,6 +239,7 @@ def finish_job(
             "missing": grade.missing,
             "notes": list(grade.notes),
             "hints": list(grade.hints),
+            "sentences": encode_sentences(grade),
             "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,
             "plots_due_at": current_time,

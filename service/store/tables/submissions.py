@@ -125,6 +125,8 @@ class Job(Base):
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
     hints: Mapped[Any] = mapped_column(default=list)  # sentences on the probable causes of lost marks
+    #: [["template", {"name": value}], ...]: those texts of the grade that can be translated.
+    sentences: Mapped[Any] = mapped_column(default=list, deferred=True)
     missing: Mapped[str] = mapped_column(default="")  # the required part that was not submitted
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 

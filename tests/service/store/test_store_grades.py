@@ -7,13 +7,14 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from decimal import Decimal
 
+import numpy
 import pytest
 from sqlalchemy import select, text, update
 
 import report_builders
 from builders import accept_one, comparable
 from responders.sandbox.meter import JobCosts, JobLimits
-from service.grading.grade import Cost, Grade
+from service.grading.grade import Cost, Grade, VisibleFeedback, convert_texts
 from service.reports.formats.json_output import build_json_document
 from service.reports.formats.text import render_plain_text
 from service.reports.view import build_staff_view
@@ -28,6 +29,7 @@ from service.store.tables.grades import Artifact, CriterionResultRow
 from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError, UsageError
 from sim.recording import TimedText
+from sim.sentences import Sentence, join_sentences
 
 
 def _stored(store: Store, grade: Grade) -> str:
@@ -62,6 +64,45 @@ def test_a_grade_comes_back_as_it_was(store: Store, make: Callable[[], Grade]) -
     assert (back.marks, back.max_marks, back.verdict) == (grade.marks, grade.max_marks, grade.verdict)
     assert build_json_document(build_staff_view(words)) == build_json_document(build_staff_view(back))
     assert render_plain_text(build_staff_view(words)) == render_plain_text(build_staff_view(back))
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        Sentence("The robot ended at %(pose)s.", pose=Sentence("(%(x).1f, %(y).1f)", x=1.25, y=2)),
+        join_sentences(Sentence("One of %(count)s.", count=numpy.int64(3)), "A quote.", Sentence("Two.")),
+        Sentence("%(text)s was sent", text="a\x00b \ud800"),
+        Sentence("%(marks)s of %(of)s", marks=Decimal("1.50"), of=numpy.float64(2.0)),
+    ],
+)
+def test_sentences_of_a_stored_grade_can_be_translated(store: Store, sentence: str) -> None:
+    first, *others = report_builders.shape_grade().criteria
+    evidence = tuple(replace(each, message=sentence) for each in first.evidence)
+    shown = VisibleFeedback(sentence)
+    result = replace(first, message=sentence, evidence=evidence, shown=shown, unjudged=sentence, for_staff=sentence)
+    grade = replace(
+        report_builders.shape_grade(), criteria=(result, *others), hints=(sentence, "plain"), notes=(sentence,)
+    )
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        back = results.load_grade(session, job_id)
+        in_list = results.load_marks(session, [job_id])[job_id]
+    texts: list[str] = []
+    convert_texts(back, lambda text: texts.append(text) or text)
+    stored_sentences = [each for each in texts if isinstance(each, Sentence)]
+    assert len(stored_sentences) == len(evidence) + 6
+    assert {each.template for each in stored_sentences} == {sentence.template}
+    assert {str(each) for each in stored_sentences} == {make_storable(str(sentence))}
+    assert isinstance(in_list.criteria[0].message, Sentence)
+    assert back.hints[1] == "plain"
+
+
+def test_a_sentence_whose_format_a_stored_value_does_not_fit_is_stored_as_text(store: Store) -> None:
+    grade = replace(report_builders.shape_grade(), hints=(Sentence("%(marks).1f marks", marks=Decimal("1.5")),))
+    job_id = _stored(store, grade)
+    with store.reading() as session:
+        (hint,) = results.load_grade(session, job_id).hints
+    assert (hint, type(hint)) == ("1.5 marks", str)
 
 
 def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> None:
