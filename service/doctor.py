@@ -39,6 +39,7 @@ from service.store.states import JobState
 from service.store.tables.submissions import Job
 from service.version import GRADER_VERSION, describe_release_problem
 from sim.errors import RobomarkError
+from sim.sentences import Sentence
 from submissions.seeds import format_secret_name
 
 _FREE_BYTES = 1_000_000_000
@@ -47,6 +48,8 @@ _CLOCK_DIFFERENCE_SECONDS = 5.0
 _LONG_WAIT_SECONDS = 60.0
 _STUCK_SECONDS = 180.0
 _READY_SECONDS = 2.0
+#: Two findings of one check, the same in all languages.
+_LIST = "%(first)s; %(next)s"
 #: SQLSTATE of PostgreSQL.
 _DISK_FULL = "53100"
 
@@ -96,9 +99,8 @@ def _run_service_check(check: Check, settings: Settings, store: Store) -> Findin
     try:
         return Finding(check.what, *check.check_service(settings, store))
     except (RobomarkError, SQLAlchemyError, OSError) as error:
-        return Finding(
-            check.what, False, "the disk is full" if _is_disk_full(error) else "no connection to the database"
-        )
+        no_connection = Sentence("no connection to the database")
+        return Finding(check.what, False, Sentence("the disk is full") if _is_disk_full(error) else no_connection)
 
 
 def _is_disk_full(error: Exception) -> bool:
@@ -114,7 +116,9 @@ def _is_disk_full(error: Exception) -> bool:
 
 
 def _check_release(_settings: Settings) -> tuple[bool, str]:
-    return True, f"Robomark {GRADER_VERSION}, tables at revision {find_newest_revision()}"
+    return True, Sentence(
+        "Robomark %(version)s, tables at revision %(revision)s", version=GRADER_VERSION, revision=find_newest_revision()
+    )
 
 
 def _check_service_release(settings: Settings, _store: Store) -> tuple[bool, str]:
@@ -147,7 +151,7 @@ def _check_sandbox(_settings: Settings) -> tuple[bool, str]:
 
 def _check_worker_sandboxes(_settings: Settings, store: Store) -> tuple[bool, str]:
     layers = sorted({worker.sandbox for worker in _load_recent_workers(store)})
-    return bool(layers), "; ".join(layers) or "no worker has reported its sandbox layers"
+    return bool(layers), "; ".join(layers) or Sentence("no worker has reported its sandbox layers")
 
 
 def _check_control_groups(settings: Settings) -> tuple[bool, str]:
@@ -203,8 +207,8 @@ def _check_database(settings: Settings) -> tuple[bool, str]:
 def _check_tables(_settings: Settings, store: Store) -> tuple[bool, str]:
     state = load_schema_state(store.engine)
     if not state.is_usable:
-        return False, f"its tables are {state.problem or 'missing'}"
-    return True, f"connected, tables at revision {state.revision}"
+        return False, Sentence("its tables are %(problem)s", problem=state.problem or Sentence("missing"))
+    return True, Sentence("connected, tables at revision %(revision)s", revision=state.revision)
 
 
 def _check_secret(settings: Settings) -> tuple[bool, str]:
@@ -250,7 +254,9 @@ def _check_broker(settings: Settings) -> tuple[bool, str]:
 
 def _check_service_broker(settings: Settings, _store: Store) -> tuple[bool, str]:
     version = fetch_broker_version(settings.broker_url, _READY_SECONDS)
-    return version is not None, f"running, version {version}" if version else "no connection"
+    if version is None:
+        return False, Sentence("no connection")
+    return True, Sentence("running, version %(version)s", version=version)
 
 
 def _check_known_answer(settings: Settings) -> tuple[bool, str]:
@@ -314,20 +320,20 @@ def _check_workers(settings: Settings) -> tuple[bool, str]:
 def _check_service_workers(_settings: Settings, store: Store) -> tuple[bool, str]:
     recent_workers = _load_recent_workers(store)
     if not recent_workers:
-        return False, "no worker was seen recently"
+        return False, Sentence("no worker was seen recently")
     ready_workers = [worker for worker in recent_workers if not worker.problem]
-    description = (
-        f"{len(ready_workers)} seen recently, concurrency {sum(worker.concurrency for worker in ready_workers)}"
-    )
-    problems = Counter(worker.problem for worker in recent_workers if worker.problem)
-    return bool(ready_workers), "; ".join(
-        [description, *(f"{count} not ready: {problem}" for problem, count in problems.items())]
-    )
+    slots = sum(worker.concurrency for worker in ready_workers)
+    description = Sentence("%(count)s seen recently, concurrency %(slots)s", count=len(ready_workers), slots=slots)
+    problem_counts = Counter(worker.problem for worker in recent_workers if worker.problem)
+    for problem, count in problem_counts.items():
+        unready = Sentence("%(count)s not ready: %(problem)s", count=count, problem=problem)
+        description = Sentence(_LIST, first=description, next=unready)
+    return bool(ready_workers), description
 
 
 def _check_queue(settings: Settings) -> tuple[bool, str]:
     with _open_usable_store(settings) as store:
-        return (True, "empty") if store is None else _check_service_queue(settings, store)
+        return (True, Sentence("empty")) if store is None else _check_service_queue(settings, store)
 
 
 def _check_service_queue(_settings: Settings, store: Store) -> tuple[bool, str]:
@@ -336,16 +342,20 @@ def _check_service_queue(_settings: Settings, store: Store) -> tuple[bool, str]:
     queued_count = sum(metrics.claimable.values())
     oldest_seconds = max(metrics.oldest_seconds.values(), default=0.0)
     dead_count = metrics.count(JobState.DEAD)
-    description = f"{queued_count} queued" + (
-        f", the oldest for {timedelta(seconds=round(oldest_seconds))}" if queued_count else ""
-    )
-    description += f"; {dead_count} failed: see robomark batch list and robomark batch retry" if dead_count else ""
+    description = Sentence("%(count)s queued", count=queued_count)
+    if queued_count:
+        oldest = str(timedelta(seconds=round(oldest_seconds)))
+        description = Sentence("%(queued)s, the oldest for %(time)s", queued=description, time=oldest)
+    if dead_count:
+        failed = Sentence("%(count)s failed: see robomark batch list and robomark batch retry", count=dead_count)
+        description = Sentence(_LIST, first=description, next=failed)
     if queued_count and oldest_seconds > _LONG_WAIT_SECONDS and not any(seen.lately for seen in metrics.workers):
-        return False, f"{description}; no worker was seen recently"
+        return False, Sentence(_LIST, first=description, next=Sentence("no worker was seen recently"))
     # In a long backlog, no job may be running for a moment between two jobs.
     is_idle = metrics.idle_seconds > _STUCK_SECONDS and not metrics.count(JobState.RUNNING)
     if queued_count and oldest_seconds > _STUCK_SECONDS and is_idle:
-        return False, f"{description}; workers are running but start no jobs: check their logs or restart them"
+        stuck = Sentence("workers are running but start no jobs: check their logs or restart them")
+        return False, Sentence(_LIST, first=description, next=stuck)
     return True, description
 
 
@@ -365,19 +375,19 @@ def _open_usable_store(settings: Settings) -> Iterator[Store | None]:
 
 
 CHECKS = (
-    Check("release", _check_release, _check_service_release),
+    Check(Sentence("release"), _check_release, _check_service_release),
     Check("Python", _check_python),
     Check("files", check_installed_files),
     Check("simulator", _check_simulator),
-    Check("sandbox", _check_sandbox, _check_worker_sandboxes),
+    Check(Sentence("sandbox"), _check_sandbox, _check_worker_sandboxes),
     Check("control groups", _check_control_groups),
     Check("between trials", _check_trial_isolation),
     Check("home", _check_home),
-    Check("database", _check_database, _check_tables),
+    Check(Sentence("database"), _check_database, _check_tables),
     Check("secret", _check_secret),
-    Check("broker", _check_broker, _check_service_broker),
+    Check(Sentence("broker"), _check_broker, _check_service_broker),
     Check("clock", _check_clock),
-    Check("workers", _check_workers, _check_service_workers),
-    Check("queue", _check_queue, _check_service_queue),
+    Check(Sentence("workers"), _check_workers, _check_service_workers),
+    Check(Sentence("queue"), _check_queue, _check_service_queue),
     Check("known answer", _check_known_answer),
 )

@@ -27,6 +27,7 @@ _TRANSLATED_SOURCES = [
 _ERROR_SOURCES = [
     (f"{name}.py", "python")
     for name in (
+        "doctor",
         "operations/**",
         "store/batches/intake",
         "store/courses/open_assignments",
@@ -35,6 +36,8 @@ _ERROR_SOURCES = [
         "store/grades/overrides",
         "store/people/lti",
         "store/queue/test_runs",
+        "store/revision",
+        "version",
         "web/pages/own_assignments",
     )
 ]

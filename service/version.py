@@ -9,6 +9,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from sim.sentences import Sentence
+
 GRADER_VERSION = version("robomark")
 
 _ROOT = Path(__file__).parent.parent
@@ -30,7 +32,11 @@ def describe_release_problem() -> str:
     installed_version = _find_version("robomark")
     if installed_version == GRADER_VERSION:
         return ""
-    return f"the installed release ({installed_version}) differs from the running one ({GRADER_VERSION}); restart"
+    return Sentence(
+        "the installed release (%(installed)s) differs from the running one (%(running)s); restart",
+        installed=installed_version,
+        running=GRADER_VERSION,
+    )
 
 
 @cache

@@ -265,8 +265,17 @@ class Grade:
 def build_unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
-    note = "%(count)s of %(criteria)s criteria could not be judged; staff will review them"
-    return (Sentence(note, count=count, criteria=len(criteria)),) if count else ()
+    return (
+        (
+            Sentence(
+                "%(count)s of %(criteria)s criteria could not be judged; staff will review them",
+                count=count,
+                criteria=len(criteria),
+            ),
+        )
+        if count
+        else ()
+    )
 
 
 def convert_texts(grade: Grade, convert: Callable[[str], str]) -> Grade:

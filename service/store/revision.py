@@ -13,9 +13,11 @@ from sqlalchemy import Engine, Select, column, inspect, select, table
 from sqlalchemy.engine import Connection
 from sqlalchemy.orm import Session
 
+from sim.sentences import Sentence
+
 _TABLE = "alembic_version"
 _COMPATIBILITY = table("schema_compatibility", column("oldest_compatible"))
-_NEWER_ADVICE = "install the newer release and restart"
+_NEWER_ADVICE = Sentence("install the newer release and restart")
 _OLDER_ADVICE = "robomark db upgrade"
 
 
@@ -47,7 +49,12 @@ class SchemaState:
         if self.is_usable or self.revision is None:
             return ""
         advice = _OLDER_ADVICE if self.revision < find_newest_revision() else _NEWER_ADVICE
-        return f"at revision {self.revision}, this Robomark at {find_newest_revision()}: {advice}"
+        return Sentence(
+            "at revision %(revision)s, this Robomark at %(own)s: %(advice)s",
+            revision=self.revision,
+            own=find_newest_revision(),
+            advice=advice,
+        )
 
 
 def load_current_revision(engine: Engine) -> str | None:

@@ -103,8 +103,9 @@ def summarise_trials(trials: IndexedTrials, outcomes: Sequence[Outcome]) -> str:
     passes = sum(outcome.passed for outcome in outcomes)
     if count and passes == count:
         return outcomes[0].message if count == 1 else Sentence("As expected in all %(count)s trials.", count=count)
-    tally_sentence = "%(passes)s of %(count)s trials went as expected."
-    tally = Sentence(tally_sentence, passes=passes, count=count) if count != 1 else ""
+    tally = (
+        Sentence("%(passes)s of %(count)s trials went as expected.", passes=passes, count=count) if count != 1 else ""
+    )
     for (_, trial), outcome in zip(trials, outcomes, strict=True):
         if not outcome.passed:
             located_message = add_place(describe_place(trial, outcome.t), outcome.message)

@@ -42,8 +42,13 @@ def describe_place(trial: TrialResult, t: float | None) -> str:
     """Return a place as ``In scenario line, from (100, 800) facing 0°, with light noise 32, at 3.00 s``."""
     start = trial.recording.start
     x, y, heading = (f"{round(value, 1):g}" for value in (start.x, start.y, start.heading))
-    start_place = "In scenario %(scenario)s, from (%(x)s, %(y)s) facing %(heading)s°"
-    place: str = Sentence(start_place, scenario=trial.scenario, x=x, y=y, heading=heading)
+    place: str = Sentence(
+        "In scenario %(scenario)s, from (%(x)s, %(y)s) facing %(heading)s°",
+        scenario=trial.scenario,
+        x=x,
+        y=y,
+        heading=heading,
+    )
     if trial.light_noise:
         place = Sentence("%(place)s, with light noise %(level)g", place=place, level=trial.light_noise)
     if trial.motor_noise:

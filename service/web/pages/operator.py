@@ -5,12 +5,13 @@ They show no contents of grades.
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.language import translatable
+from service.language import Language, translatable
 from service.operations import batches, people, system
 from service.operations import courses as course_operations
 from service.operations.courses import MemberRequest
@@ -18,7 +19,11 @@ from service.operations.types import JobQueue, JobState
 from service.web.access import OperatorReader, RowNumberAfter, SentRowName
 from service.web.context import Context
 from service.web.created_links import LinkWord, derive_secret, find_created_link, generate_word
+from service.web.language import detect_language
 from service.web.rendering import is_htmx_request, render_page
+
+if TYPE_CHECKING:
+    from service.doctor import Finding
 
 router = APIRouter()
 _QUEUE_TITLES = {
@@ -49,13 +54,21 @@ def show_status(request: Request, reader: OperatorReader, context: Context) -> R
         request,
         reader,
         template,
-        findings=view.findings,
+        findings=[_translate_finding(finding, detect_language(request)) for finding in view.findings],
         lanes=lanes,
         metrics=view.metrics,
         quarantined=view.quarantined,
         dead=view.failed,
         dead_count=view.failed_count,
         version=view.version,
+    )
+
+
+def _translate_finding(finding: Finding, language: Language) -> Finding:
+    return replace(
+        finding,
+        what=language.translate_sentence(finding.what),
+        sentence=language.translate_sentence(finding.sentence),
     )
 
 
