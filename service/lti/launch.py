@@ -11,8 +11,8 @@ from typing import Any
 from urllib.parse import urlencode
 
 import jwt
-from jwt import PyJWKSet
-from jwt.exceptions import PyJWTError
+from jwt import PyJWK, PyJWKSet
+from jwt.exceptions import InvalidAlgorithmError, PyJWTError
 
 from service.lti.platform_requests import fetch_json
 from service.store.people.lti import PendingLaunch, Platform
@@ -25,6 +25,7 @@ MEMBERS_CLAIM = "https://purl.imsglobal.org/spec/lti-nrps/claim/namesroleservice
 GRADES_CLAIM = "https://purl.imsglobal.org/spec/lti-ags/claim/endpoint"
 _MEMBERSHIP_ROLES = "http://purl.imsglobal.org/vocab/lis/v2/membership"
 _CLOCK_LEEWAY_SECONDS = 60
+_ALGORITHM = "RS256"
 _MAX_TEXT_LENGTH = 250
 
 
@@ -64,17 +65,25 @@ def build_authorization_url(
 
 
 def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
-    """Verify the signature, audience, time and nonce of an identity token and return its launch.
+    """Verify the audience, time, nonce and signature of an identity token and return its launch.
+
+    The signature is checked last: only a token that passes all other checks causes a request for the platform's keys.
 
     Raises UsageError if the token is not trusted, PlatformError if the platform's keys cannot be fetched.
     """
-    claims = _verify_token(pending, id_token)
+    launch = _build_launch(pending.platform, _read_claims(pending, id_token))
+    _verify_signature(pending.platform, id_token)
+    return launch
+
+
+def _build_launch(platform: Platform, claims: Mapping[str, Any]) -> Launch:
+    """Return the launch with these claims. Raises UsageError if one is missing or not supported."""
     if claims.get(f"{CLAIM}version") != "1.3.0":
         raise UsageError("this launch does not use LTI 1.3")
     if claims.get(f"{CLAIM}message_type") != "LtiResourceLinkRequest":
         raise UsageError("this launch does not come from a link in a course; open Robomark from a course link")
     deployment_id = claims.get(f"{CLAIM}deployment_id")
-    if not isinstance(deployment_id, str) or deployment_id not in pending.platform.deployments:
+    if not isinstance(deployment_id, str) or deployment_id not in platform.deployments:
         raise UsageError(f"the deployment of this launch is not registered: {str(deployment_id)[:80]!r}")
     context = _read_object(claims, f"{CLAIM}context")
     context_id = context.get("id")
@@ -84,7 +93,7 @@ def read_launch(pending: PendingLaunch, id_token: str) -> Launch:
     title = context.get("title") or context.get("label") or context_id
     return Launch(
         subject=subject,
-        student=_parse_student(claims, pending.platform, subject),
+        student=_parse_student(claims, platform, subject),
         role=parse_role(claims.get(f"{CLAIM}roles")),
         deployment=deployment_id,
         context=context_id,
@@ -110,29 +119,58 @@ def build_student(platform: Platform, subject: str, id: str | None, name: str | 
     )
 
 
-def _verify_token(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
-    platform = pending.platform
-    keys = fetch_json(platform.keys_url).value
-    try:
-        key_set = PyJWKSet.from_dict(keys)
-        key = key_set[jwt.get_unverified_header(id_token).get("kid", "")]
-        claims: dict[str, Any] = jwt.decode(
-            id_token,
-            key,
-            algorithms=["RS256"],
-            audience=platform.client_id,
-            issuer=platform.issuer,
-            leeway=_CLOCK_LEEWAY_SECONDS,
-            options={"require": ["exp", "iat", "aud", "iss", "sub", "nonce"]},
-        )
-    except (PyJWTError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"the platform's token is invalid: {error}") from None
+def _read_claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
+    """Return the claims of a token after the checks that need no request. Its signature is not verified."""
+    client_id = pending.platform.client_id
+    claims = _decode_token(pending.platform, id_token)
     audience = claims["aud"]
-    if isinstance(audience, list) and len(audience) > 1 and claims.get("azp") != platform.client_id:
+    if isinstance(audience, list) and len(audience) > 1 and claims.get("azp") != client_id:
         raise UsageError("the platform's token is for another tool")
     if claims["nonce"] != pending.nonce:
         raise UsageError("this launch was already used or started elsewhere; open the link in the course again")
     return claims
+
+
+def _verify_signature(platform: Platform, id_token: str) -> None:
+    keys = fetch_json(platform.keys_url).value
+    try:
+        key = PyJWKSet.from_dict(keys)[jwt.get_unverified_header(id_token).get("kid", "")]
+    except (PyJWTError, KeyError, TypeError, AttributeError) as error:
+        raise _build_token_error(error) from None
+    _decode_token(platform, id_token, key)
+
+
+def _decode_token(platform: Platform, id_token: str, key: PyJWK | None = None) -> dict[str, Any]:
+    """Return the claims of a token for this tool that has not expired. Its signature is verified if there is a key."""
+    try:
+        if jwt.get_unverified_header(id_token).get("alg") != _ALGORITHM:
+            raise InvalidAlgorithmError(f"its algorithm is not {_ALGORITHM}")
+        claims: dict[str, Any] = jwt.decode(
+            id_token,
+            "" if key is None else key,
+            algorithms=[_ALGORITHM],
+            audience=platform.client_id,
+            issuer=platform.issuer,
+            leeway=_CLOCK_LEEWAY_SECONDS,
+            # Without the signature, PyJWT checks only what it is asked to check.
+            options={
+                "verify_signature": key is not None,
+                "verify_exp": True,
+                "verify_nbf": True,
+                "verify_iat": True,
+                "verify_aud": True,
+                "verify_iss": True,
+                "verify_sub": True,
+                "require": ["exp", "iat", "aud", "iss", "sub", "nonce"],
+            },
+        )
+    except (PyJWTError, KeyError, TypeError, AttributeError) as error:
+        raise _build_token_error(error) from None
+    return claims
+
+
+def _build_token_error(error: Exception) -> UsageError:
+    return UsageError(f"the platform's token is invalid: {error}")
 
 
 def _parse_student(claims: Mapping[str, Any], platform: Platform, subject: str) -> Student:

@@ -39,6 +39,7 @@ class LearningPlatform:
     columns: list[dict[str, Any]] = field(default_factory=list)
     scores: list[dict[str, Any]] = field(default_factory=list)
     tokens: dict[str, str] = field(default_factory=dict)  # token -> scopes
+    paths: list[str] = field(default_factory=list)  # of all requests
 
     def claims(self, begun: dict[str, str], subject: str, *roles: str, **changes: Any) -> dict[str, Any]:
         at = int(time.time())
@@ -69,6 +70,7 @@ class LearningPlatform:
 
     def answer(self, method: str, path: str, query: dict[str, list[str]], body: bytes, token: str) -> tuple[int, Any]:
         """Return the answer: a status and JSON."""
+        self.paths.append(path)
         if path == "/keys":
             public = json.loads(RSAAlgorithm.to_jwk(self.key.public_key()))
             return 200, {"keys": [{**public, "kid": "k1", "alg": "RS256", "use": "sig"}]}

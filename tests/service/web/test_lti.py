@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 from urllib.parse import parse_qs, urlsplit
 
+import jwt
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from httpx2 import Response
@@ -145,12 +146,29 @@ def test_a_word_that_is_not_to_be_trusted_signs_nobody_in(
     assert answer.status_code == 422
     assert sentence in answer.text
     assert browser.get("/account").status_code == 303
+    # Only the key itself has to be requested; everything else is checked before.
+    assert platform.paths == ["/keys"] * bool(header)
 
 
 @pytest.mark.parametrize("token", ["", "x", "a.b.c", "eyJhbGciOiJub25lIn0.e30."])
 def test_what_is_no_token_is_refused(launched: tuple[Web, LearningPlatform], token: str) -> None:
-    browser = _browser(launched[0])
+    web, platform = launched
+    browser = _browser(web)
     assert _end(browser, _begin(browser)["state"], token).status_code == 422
+    assert platform.paths == []
+
+
+@pytest.mark.parametrize("algorithm", ["none", "HS256"])
+def test_a_token_with_another_algorithm_is_refused(launched: tuple[Web, LearningPlatform], algorithm: str) -> None:
+    web, platform = launched
+    browser = _browser(web)
+    begun = _begin(browser)
+    key = "" if algorithm == "none" else "k" * 64
+    token = jwt.encode(platform.claims(begun, "grace", INSTRUCTOR), key, algorithm, headers={"kid": "k1"})
+    answer = _end(browser, begun["state"], token)
+    assert answer.status_code == 422
+    assert "token is invalid" in answer.text
+    assert platform.paths == []
 
 
 def test_a_launch_counts_once_and_in_the_browser_that_began_it(launched: tuple[Web, LearningPlatform]) -> None:
