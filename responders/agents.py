@@ -23,6 +23,7 @@ from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.trial_spec import AgentSpec
 from sim.random_streams import RandomStream
 from sim.readers.json_text import read_json
+from sim.readers.reader_errors import UnreadableDataError
 from sim.recording import SECOND, AgentMessage, AgentOutput, Fault, Recording, Verdict
 from sim.world import HashChain
 
@@ -293,10 +294,12 @@ def _parse_content(text: str, kind: type) -> Any:
     """
     try:
         value = read_json(text, parse_constant=_reject_constant)
+    except UnreadableDataError as error:
+        raise ChildStopped(Verdict.PROTOCOL_ERROR, f"it sent a message that cannot be read: {error}") from None
     except ValueError:
         value = _INVALID_JSON
     if value is _INVALID_JSON or not isinstance(value, kind):
-        raise ChildStopped(Verdict.PROTOCOL_ERROR, "it sent a message that is no JSON or is nested too deeply")
+        raise ChildStopped(Verdict.PROTOCOL_ERROR, "it sent a message that is no JSON")
     return value
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from sim.errors import UsageError
 from sim.readers.json_text import JSONDecodeError, read_json
 from sim.readers.python_source import parse_module
-from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError
+from sim.readers.reader_errors import TooLongNumberError, TooManyValuesError, UnreadableDataError
 from sim.sentences import Sentence
 from submissions.raw_files import sanitise_name
 from submissions.source_text import MAX_SOURCE_BYTES, is_program_magic
@@ -197,6 +197,10 @@ def _parse_document(text: str, name: str) -> Mapping[str, Any]:
         raise UsageError(
             "%(name)s: has too much output in it, expected a notebook whose outputs were cleared before it was saved.",
             name=name,
+        ) from None
+    except TooLongNumberError:
+        raise UsageError(
+            "%(name)s: has a number that is too long, expected a notebook as Jupyter saves it.", name=name
         ) from None
     except UnreadableDataError:
         raise UsageError(

@@ -12,7 +12,13 @@ from collections.abc import Callable
 from json import JSONDecodeError
 from typing import Any
 
-from sim.readers.reader_errors import MAX_DEPTH, TooManyValuesError, UnreadableDataError, check_depth
+from sim.readers.reader_errors import (
+    MAX_DEPTH,
+    TooLongNumberError,
+    TooManyValuesError,
+    UnreadableDataError,
+    check_depth,
+)
 
 __all__ = ["MAX_VALUES", "JSONDecodeError", "read_json"]
 
@@ -50,7 +56,7 @@ def read_json(
         if "integer string conversion" not in str(error):
             raise
         # Python rejects integers with thousands of digits.
-        raise UnreadableDataError("it has a number that is too long") from None
+        raise TooLongNumberError() from None
 
 
 def _check_limits(text: str, max_values: int) -> None:

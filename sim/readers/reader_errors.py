@@ -21,6 +21,13 @@ class TooManyValuesError(UnreadableDataError):
     """The data contain more values than the limit."""
 
 
+class TooLongNumberError(UnreadableDataError):
+    """A number has more digits than Python converts."""
+
+    def __init__(self) -> None:
+        super().__init__("it has a number that is too long")
+
+
 def check_depth(structure: str) -> None:
     """Raise UnreadableDataError if brackets are nested deeper than ``MAX_DEPTH``. ``structure`` contains no strings.
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from tomllib import TOMLDecodeError
 from typing import Any
 
-from sim.readers.reader_errors import TooManyValuesError, UnreadableDataError, check_depth
+from sim.readers.reader_errors import TooLongNumberError, TooManyValuesError, UnreadableDataError, check_depth
 
 __all__ = ["MAX_KEY_PARTS", "TOMLDecodeError", "read_toml"]
 
@@ -48,7 +48,7 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
         raise UnreadableDataError("it is nested too deeply") from None
     except ValueError:
         # Python rejects integers with thousands of digits.
-        raise UnreadableDataError("it has a number that is too long") from None
+        raise TooLongNumberError() from None
     _check_numbers(document)
     return document
 
@@ -56,7 +56,7 @@ def read_toml(text: str, parse_float: Callable[[str], Any] = float) -> dict[str,
 def _check_numbers(value: object) -> None:
     """Raise UnreadableDataError for a number over 64 bits, TOML's limit. Python cannot print very long numbers."""
     if isinstance(value, int) and value.bit_length() > 64:
-        raise UnreadableDataError("it has a number that is too long")
+        raise TooLongNumberError()
     for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         _check_numbers(item)
 

@@ -18,6 +18,7 @@ from responders.source_file import SourceFile
 from sim.errors import UsageError
 from submissions.assignment.definition import Parts
 from submissions.bundle import read_submission
+from submissions.notebook import read_notebook
 from submissions.part_fitting import fit_parts
 from submissions.raw_files import MAX_FILE_BYTES, MAX_FILES, read_zip_bytes
 from submissions.stored_submission import pack_submission, unpack_submission
@@ -228,6 +229,20 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
         folder(tmp_path / "two", {"robot.py": PROGRAM, "program.py": PROGRAM})
     )
     assert "folder sub" in refusal(folder(tmp_path / "nested", {"robot.py": PROGRAM, "sub/x.py": ""}))
+
+
+@pytest.mark.parametrize(
+    ("metadata", "sentence"),
+    [
+        ("1" * 5000, "lab.ipynb: has a number that is too long, expected a notebook as Jupyter saves it."),
+        ("[" * 200 + "]" * 200, "lab.ipynb: is nested too deeply, expected a notebook as Jupyter saves it."),
+    ],
+    ids=["number", "depth"],
+)
+def test_the_reason_why_a_notebook_is_refused_is_the_right_one(metadata: str, sentence: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        read_notebook(f'{{"cells": [], "metadata": {metadata}}}'.encode(), "lab.ipynb")
+    assert str(refused.value) == sentence
 
 
 def test_links_pipes_and_devices_in_folders_are_never_opened(tmp_path: Path) -> None:
