@@ -22,8 +22,9 @@ _OUTSIDE = _INSIDE | {
     r"\Z": r"\z",
     "{,": "{0,",
 }
-#: An escape, a class in brackets, or a repetition without a minimum.
-_PART = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|\{,(?=\d+\})", re.DOTALL)
+#: An escape, a class in brackets, or a repetition without a minimum. A class without an end extends to the end of the
+#: pattern, which avoids a new search at each later bracket.
+_PART = re.compile(r"\\.|\[\^?+\]?+(?:\\.|[^\]\\])*+(?:\]|\\?\Z)|\{,(?=\d++\})", re.DOTALL)
 _ESCAPE = re.compile(r"\\.", re.DOTALL)
 
 

@@ -32,7 +32,7 @@ from sim.errors import Cancelled, HostError
 from sim.recording import Call, Image, Message, TimedText, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.reader import read_assignment
-from submissions.criteria import SCHEMAS
+from submissions.criteria import SCHEMAS, expressions
 from submissions.criteria.expressions import check_pattern, has_match
 from submissions.submission import Submission
 
@@ -247,6 +247,14 @@ def test_the_very_end_is_told_from_the_end_of_a_line() -> None:
 def test_patterns_are_tried_on_what_is_no_text() -> None:
     assert has_match("a\ud800b", "^a.b$", False)
     assert not has_match("a" * 60_000 + "!", check_pattern(r"^(\w+\s?)+$"), False)
+
+
+@pytest.mark.parametrize("part", ["[", "[^", "[x", r"[\\"])
+def test_a_class_without_an_end_is_searched_for_once(part: str) -> None:
+    pattern = part * 100_000
+    assert expressions._PART.findall("a" + pattern) == [pattern]
+    with pytest.raises(ValueError, match="regular expression"):
+        check_pattern(pattern)
 
 
 def _sleeps() -> None:
