@@ -18,12 +18,12 @@ from service.store.engine import retry_conflicts
 from service.store.grades import comments, marking_history, overrides
 from service.store.grades.comments import MAX_COMMENT_LENGTH, CommentLine
 from service.store.grades.marking_history import MarkingStep
-from service.store.grades.overrides import MAX_REASON_LENGTH, CriterionMarks
+from service.store.grades.overrides import MAX_REASON_LENGTH, CriterionMarks, parse_marks
 from service.store.states import JobState, Role
 from service.store.tables.courses import AssignmentVersion
 from service.store.tables.submissions import Job
 
-__all__ = ["MAX_COMMENT_LENGTH", "MAX_REASON_LENGTH"]
+__all__ = ["MAX_COMMENT_LENGTH", "MAX_REASON_LENGTH", "parse_marks"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def set_marks(service: Service, actor: Actor, course_id: int, job_id: str, reque
         Conflict: The submission is not graded, or the marks changed after the actor read them.
         UsageError: The criterion is unknown, the marks are out of range, or the reason is missing.
     """
-    new_marks = overrides.parse_marks(request.marks) if isinstance(request.marks, str) else request.marks
+    new_marks = parse_marks(request.marks) if isinstance(request.marks, str) else request.marks
 
     def change(session: Session) -> None:
         criterion_key = (session, job_id, request.criterion)

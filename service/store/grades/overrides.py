@@ -5,10 +5,11 @@ An override belongs to the submission, so it also applies to later grades. The g
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 
 from sqlalchemy import ColumnElement, and_, exists, select, update
 from sqlalchemy.orm import Session
@@ -26,6 +27,8 @@ MAX_REASON_LENGTH = 500
 #: Maximum precision: four digits after the point.
 _FINEST_MARKS = Decimal("0.0001")
 _ZERO = Decimal(0)
+#: Python's own reader also accepts 1_0, 1e1 and Infinity.
+_WRITTEN_MARKS = re.compile(r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)")
 
 
 class MarksChanged(UsageError):
@@ -64,10 +67,10 @@ class CriterionMarks:
 
 def parse_marks(text: str) -> Decimal:
     """Parse marks with a decimal point or comma. Raises UsageError for anything else."""
-    try:
-        return Decimal(text.strip().replace(",", "."))
-    except InvalidOperation:
-        raise UsageError("marks are %(text)s, expected a number such as 2.5", text=repr(text.strip()[:40])) from None
+    written_marks = text.strip()
+    if not _WRITTEN_MARKS.fullmatch(written_marks):
+        raise UsageError("marks are %(text)s, expected a number such as 2.5", text=repr(written_marks[:40]))
+    return Decimal(written_marks.replace(",", "."))
 
 
 def set_marks(

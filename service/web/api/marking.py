@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import Annotated
 
 from fastapi import Depends, Path, Query
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 
 from service.operations import appeals, grades
 from service.operations.appeals import MAX_TEXT_LENGTH
@@ -18,6 +18,7 @@ from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.context import Context, WebContext
+from sim.errors import UsageError
 
 router = api_router("marking")
 ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "read"))]
@@ -112,10 +113,18 @@ class MarkingShape(Shape):
     )
 
 
+def _read_marks(value: object) -> object:
+    """Return marks sent as a text as the pages and commands read them."""
+    try:
+        return grades.parse_marks(value) if isinstance(value, str) else value
+    except UsageError as error:
+        raise ValueError(str(error)) from None
+
+
 class MarksBody(BaseModel):
     """Marks that replace the grader's marks (null excuses the criterion), and a reason that students can read."""
 
-    marks: Decimal | None = Field(ge=0, le=10_000, examples=[5])
+    marks: Annotated[Decimal | None, BeforeValidator(_read_marks)] = Field(ge=0, le=10_000, examples=[5])
     reason: str = Field(min_length=1, max_length=MAX_REASON_LENGTH, examples=["The last one is named."])
     seen: int | None = Field(None, ge=0, le=HIGHEST_NUMBER, description=_SEEN_DESCRIPTION)
 

@@ -264,9 +264,17 @@ def test_what_cannot_be_is_refused_and_changes_nothing(store: Store) -> None:
     assert set(_totals(store, batch).values()) == {(7, 8)}
 
 
-@pytest.mark.parametrize(("text", "marks"), [("2.5", "2.5"), (" 2,5 ", "2.5"), ("3", "3")])
+@pytest.mark.parametrize(
+    ("text", "marks"), [("2.5", "2.5"), (" 2,5 ", "2.5"), ("3", "3"), ("3.", "3"), (",5", "0.5"), ("-0", "0")]
+)
 def test_marks_are_read_as_people_write_them(text: str, marks: str) -> None:
     assert overrides.parse_marks(text) == Decimal(marks)
+
+
+@pytest.mark.parametrize("text", ["1_0", "1e1", "0x1", "nan", "Infinity", "1.5.0", "1 0", ".", "-", "", "1" * 50 + "_"])
+def test_marks_are_refused_as_only_programs_write_them(text: str) -> None:
+    with pytest.raises(UsageError, match="expected a number such as"):
+        overrides.parse_marks(text)
 
 
 @pytest.mark.parametrize(

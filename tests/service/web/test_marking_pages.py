@@ -100,6 +100,7 @@ def test_the_course_says_how_many_appeals_wait(marked: Marked) -> None:
     ("path", "data", "sentence"),
     [
         ("set", {"criterion": CRITERION.id, "marks": "many", "reason": "x"}, "expected a number such as 2.5"),
+        ("set", {"criterion": CRITERION.id, "marks": "1_0", "reason": "x"}, "expected a number such as 2.5"),
         ("set", {"criterion": CRITERION.id, "marks": "1000", "reason": "x"}, "expected 0 to"),
         ("set", {"criterion": CRITERION.id, "marks": "1", "reason": ""}, "the reason has 0 characters"),
         ("excuse", {"criterion": "other", "reason": "x"}, "has no criterion"),
@@ -112,6 +113,21 @@ def test_what_cannot_be_is_said_in_one_sentence(marked: Marked, path: str, data:
     answer = submit(marked.grace, f"{marked.marking}/{path}", data)
     assert answer.status_code == 422
     assert sentence in answer.text.casefold()
+
+
+@pytest.mark.parametrize(("marks", "status"), [("1_0", 422), ("1e0", 422), ("1,0", 200), (1.0, 200)])
+def test_programs_write_marks_as_people_do(marked: Marked, marks: object, status: int) -> None:
+    path = f"/api/v1/courses/1/grades/{marked.world.values['job_id']}/marking/{CRITERION.id}"
+    answer = marked.web.browser().put(
+        path, headers=marked.web.token(marked.world.grace, "mark"), json={"marks": marks, "reason": "x"}
+    )
+    assert answer.status_code == status, answer.text
+    if status == 422:
+        assert "expected a number such as 2.5" in answer.text
+    else:
+        assert (
+            marked.web.browser().delete(path, headers=marked.web.token(marked.world.grace, "mark")).status_code == 200
+        )
 
 
 def test_a_comment_is_shown_and_withdrawn(marked: Marked) -> None:
