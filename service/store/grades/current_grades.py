@@ -6,6 +6,7 @@ compares the two. The current attempt is the newest that can count, regardless o
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Protocol
 
 from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, or_, select, tuple_
@@ -73,6 +74,7 @@ def match_students_of_batches(batch_ids: Select[str]) -> ColumnElement[bool]:
     return tuple_(SubmissionRow.enrolment_id, SubmissionRow.assignment).in_(pairs)
 
 
+@cache
 def select_newer_attempt() -> ColumnElement[int | None]:
     """Return the newest later attempt of the student of a ``SubmissionRow`` that does not count; None without one."""
     newer_submission, job = aliased(SubmissionRow), aliased(Job)

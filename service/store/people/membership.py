@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
@@ -200,6 +201,7 @@ def list_courses(session: Session) -> list[CourseLine]:
     return [CourseLine(*row) for row in session.execute(query.order_by(Course.name))]
 
 
+@cache
 def _match_other_access() -> ColumnElement[bool]:
     other = aliased(Enrolment)
     return or_(Person.operator, exists().where(other.person_id == Enrolment.person_id, other.id != Enrolment.id))
