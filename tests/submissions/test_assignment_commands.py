@@ -5,19 +5,25 @@ from __future__ import annotations
 import zipfile
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from command import robomark
+from service.grading import example_check
 from service.grading.example_check import ComparedMeasure, check_examples
+from service.grading.grade import Grade
+from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from sim.errors import AssignmentError, UsageError
 from submissions.assignment.assignment_overview import read_overview
+from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import ExpectedResult, OriginalMeasure, add_expected, read_example, read_expected
 from submissions.assignment.export import create_assignment, export_all, export_for_students
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.submission import Submission
 
 
 def test_a_new_assignment_is_in_order_and_its_reference_gets_full_marks(tmp_path: Path, runner: TrialRunner) -> None:
@@ -36,6 +42,11 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: Tri
     mine, theirs = read_assignment(tmp_path / "my-echo"), find_assignment("echo-responder")
     assert (mine.id, mine.criteria) == ("my-echo", theirs.criteria)
     assert check_examples(str(tmp_path / "my-echo"), runner=runner).problems == ()
+
+
+@pytest.fixture(scope="module")
+def known_grades() -> dict[str, Grade]:
+    return {}
 
 
 @pytest.mark.parametrize(
@@ -62,7 +73,22 @@ def test_a_new_assignment_like_another_marks_like_it(tmp_path: Path, runner: Tri
         ),
     ],
 )
-def test_what_is_not_as_expected_is_said(change: str, problem: str, tmp_path: Path, runner: TrialRunner) -> None:
+def test_what_is_not_as_expected_is_said(
+    change: str,
+    problem: str,
+    tmp_path: Path,
+    runner: TrialRunner,
+    known_grades: dict[str, Grade],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The examples are graded once: only the expectations differ."""
+
+    def grade_once(submission: Submission, assignment: Assignment, **options: Any) -> Grade:
+        if submission.student not in known_grades:
+            known_grades[submission.student] = grade(submission, assignment, **options)
+        return known_grades[submission.student]
+
+    monkeypatch.setattr(example_check, "grade", grade_once)
     create_assignment(tmp_path / "task")
     (tmp_path / "task" / "expected.toml").write_text(change)
     assert any(each.startswith(problem) for each in check_examples(str(tmp_path / "task"), runner=runner).problems)
