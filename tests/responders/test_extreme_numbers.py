@@ -57,7 +57,18 @@ _CALLS = (
 )
 
 
-@pytest.mark.parametrize("call", _CALLS)
+#: Two calls of each object and unit take the same way through our code; the second ones are long tests.
+_LONG = (
+    *("tank_drive.on_for_rotations", "tank_drive.on(SpeedRPS", "tank_drive.on(SpeedDPM"),
+    *("tank_turn.on(", "tank_turn.on_for_seconds", "tank_turn.on_for_degrees"),
+    *("MOTOR.on_for_degrees", "MOTOR.on_for_rotations", "MOTOR.run_direct", "MOTOR.run_to_abs_pos"),
+    *("MOTOR.wait_until('stalled'", "tank_drive.on_for_degrees(10"),
+)
+
+
+@pytest.mark.parametrize(
+    "call", [pytest.param(call, marks=[pytest.mark.long] * call.startswith(_LONG)) for call in _CALLS]
+)
 def test_an_extreme_number_is_no_violation(call: str, runner: TrialRunner) -> None:
     for number in _NUMBERS:
         statement = call.replace("MOTOR", "tank_drive.left_motor").replace("@", number)

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from rows import quick_first
+
 #: Refuses one system call with one error, for itself and all its children, then runs the rest.
 _BEHIND = """
 import ctypes, struct, sys
@@ -56,15 +58,15 @@ _CREATE, _ADD, _RESTRICT, _SECCOMP, _PIDFD_OPEN, _PIDFD_SIGNAL, _CAPSET, _UNUSED
     ("number", "error", "words"),
     [
         pytest.param(_CREATE, errno.ENOSYS, "Landlock", id="landlock-too-old"),
-        pytest.param(_CREATE, errno.EOPNOTSUPP, "Landlock", id="landlock-off"),
-        pytest.param(_CREATE, errno.EPERM, "Landlock", id="landlock-denied"),
-        pytest.param(_ADD, errno.EPERM, "Landlock", id="landlock-rules-denied"),
+        pytest.param(_CREATE, errno.EOPNOTSUPP, "Landlock", id="landlock-off", marks=pytest.mark.long),
+        pytest.param(_CREATE, errno.EPERM, "Landlock", id="landlock-denied", marks=pytest.mark.long),
+        pytest.param(_ADD, errno.EPERM, "Landlock", id="landlock-rules-denied", marks=pytest.mark.long),
         pytest.param(_RESTRICT, errno.EPERM, "Landlock", id="landlock-restriction-denied"),
-        pytest.param(_SECCOMP, errno.ENOSYS, "seccomp", id="seccomp-too-old"),
+        pytest.param(_SECCOMP, errno.ENOSYS, "seccomp", id="seccomp-too-old", marks=pytest.mark.long),
         pytest.param(_SECCOMP, errno.EPERM, "seccomp", id="seccomp-denied"),
-        pytest.param(_SECCOMP, errno.EINVAL, "seccomp", id="seccomp-without-filters"),
+        pytest.param(_SECCOMP, errno.EINVAL, "seccomp", id="seccomp-without-filters", marks=pytest.mark.long),
         pytest.param(_PIDFD_OPEN, errno.ENOSYS, "pidfd_open", id="pidfd-too-old"),
-        pytest.param(_PIDFD_OPEN, errno.EPERM, "pidfd_open", id="pidfd-denied"),
+        pytest.param(_PIDFD_OPEN, errno.EPERM, "pidfd_open", id="pidfd-denied", marks=pytest.mark.long),
         pytest.param(_PIDFD_SIGNAL, errno.EPERM, "pidfd_send_signal", id="signals-denied"),
         pytest.param(_CAPSET, errno.EPERM, "capset", id="capabilities-denied"),
     ],
@@ -91,7 +93,7 @@ def test_where_addresses_cannot_be_fixed_they_stand_without() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "word"), [(_CREATE, "Landlock"), (_SECCOMP, "seccomp"), (_PIDFD_OPEN, "pidfd_open")]
+    ("number", "word"), quick_first([(_CREATE, "Landlock"), (_SECCOMP, "seccomp"), (_PIDFD_OPEN, "pidfd_open")])
 )
 def test_the_command_line_refuses(number: int, word: str, tmp_path: Path) -> None:
     program = tmp_path / "robot.py"

@@ -175,10 +175,8 @@ RESPONDERS = {
 
 #: One attack of each kind: counts, texts, times, lines, places, answers to images. The others are long tests.
 QUICK = {
-    "the number of images", "the text of a message", "the line of an error", "the moment of the end",
-    "the way that it ends", "running on", "what it touches", "logged readings",
-    "which answers are given", "answers that cannot be read", "answers that come late", "an error",
-    "what the responder writes down",
+    "the number of images", "the text of a message", "the line of an error", "running on", "what it touches",
+    "which answers are given", "answers that come late",
 }  # fmt: skip
 
 

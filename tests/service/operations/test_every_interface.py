@@ -10,6 +10,7 @@ from decimal import Decimal
 from typing import Any
 
 import pytest
+from _pytest.mark.structures import ParameterSet
 from sqlalchemy import select, update
 
 import acting
@@ -208,7 +209,23 @@ def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installat
         yield made
 
 
-@pytest.mark.parametrize("name", TABLE)
+def _name(operation: Any) -> str:
+    return f"{operation.__module__.rpartition('.')[2]}.{operation.__name__}"
+
+
+def _list_rows() -> list[ParameterSet]:
+    """Return the rows. All but the first refusal of an operation are long tests."""
+    rows, refusing = [], set()
+    for name, row in TABLE.items():
+        operation = _name(row.operation)
+        is_long = row.refused is not None and operation in refusing
+        rows.append(pytest.param(name, marks=[pytest.mark.long] * is_long))
+        if row.refused is not None:
+            refusing.add(operation)
+    return rows
+
+
+@pytest.mark.parametrize("name", _list_rows())
 def test_an_operation_is_the_same_by_every_interface(installation: Installation, name: str) -> None:
     row = TABLE[name]
     done = {interface: installation.run(row, interface) for interface in row.interfaces}
@@ -242,10 +259,6 @@ def test_every_operation_has_a_row_and_every_missing_interface_a_reason() -> Non
     assert not tested_operations & set(ELSEWHERE)
     for name, row in TABLE.items():
         assert bool(row.alone) == (row.interfaces != INTERFACES), name
-
-
-def _name(operation: Any) -> str:
-    return f"{operation.__module__.rpartition('.')[2]}.{operation.__name__}"
 
 
 @pytest.mark.parametrize(

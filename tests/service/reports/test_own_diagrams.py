@@ -216,6 +216,9 @@ HOSTILE = (
 )
 
 
+_LARGEST = f"a -> b [label = '{'very ' * 20}\\n{'long ' * 20}'];" * MAX_STEPS
+
+
 @pytest.mark.parametrize("kind", ["blockdiag", "seqdiag"])
 @pytest.mark.parametrize(
     "text",
@@ -227,7 +230,7 @@ HOSTILE = (
         "group { a; b } group g { b; c } a -> b -> c -> a",
         "".join(f"{one} -> b{other};" for one in "xyz" for other in range(8)),
         " -> ".join(f"actor_number_{number}" for number in range(MAX_ACTORS)),
-        f"a -> b [label = '{'very ' * 20}\\n{'long ' * 20}'];" * MAX_STEPS,
+        pytest.param(_LARGEST, id="largest", marks=pytest.mark.long),
     ],
 )  # fmt: skip
 def test_whatever_is_drawn_fits_into_memory_and_repeats(kind: DiagramKind, text: str) -> None:
@@ -235,6 +238,14 @@ def test_whatever_is_drawn_fits_into_memory_and_repeats(kind: DiagramKind, text:
     highlights = Highlights(frozenset({"a"}), frozenset({("a", "b")}), words="marked")
     first, second = (render_png(draw_diagram(diagram, "t", "s", highlights)) for _ in range(2))
     assert first == second
-    with Image.open(io.BytesIO(first)) as image:
+    _assert_small(first)
+
+
+def test_the_largest_drawing_fits_into_memory() -> None:
+    _assert_small(render_png(draw_diagram(read_diagram("seqdiag", _LARGEST), "t", "s", Highlights())))
+
+
+def _assert_small(drawing: bytes) -> None:
+    with Image.open(io.BytesIO(drawing)) as image:
         assert image.width * image.height <= 6_100_000
-    assert len(first) < 800_000
+    assert len(drawing) < 800_000

@@ -12,6 +12,7 @@ from sqlalchemy import select, update
 import acting
 import report_builders
 from builders import grading_request
+from rows import quick_first
 from service.batch_rows import describe_missing_grade
 from service.lti import passback
 from service.lti.services import Score
@@ -103,7 +104,7 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
     assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick_first(range(4), 2))
 def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int) -> None:
     chance = random.Random(seed)
     with store.transaction() as session:

@@ -12,6 +12,7 @@ from sqlalchemy.exc import IntegrityError
 import acting
 import report_builders
 from builders import accept_one, grading_request
+from rows import quick_first
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
 from service.store.grades import results
@@ -60,7 +61,7 @@ def test_the_database_refuses_a_second_job_that_stands(store: Store) -> None:
         session.execute(update(Job).values(standing=Standing.STANDS))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", quick_first(range(6), 2))
 def test_one_job_stands_after_any_order_of_actions(store: Store, seed: int) -> None:
     chance = random.Random(seed)
     accept_batch(store, "class", [grading_request(name) for name in ("ada", "bob")], [], max_attempts=3)
