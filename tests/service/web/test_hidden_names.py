@@ -212,3 +212,18 @@ def test_a_student_has_another_label_in_each_assignment() -> None:
     names = HiddenNames(frozenset({"one", "two"}), b"key")
     assert names.label_student("one", "ada") == names.label_student("one", "ada")
     assert len({names.label_student(assignment, "ada") for assignment in ("one", "two", "named")}) == 3
+
+
+def test_no_two_students_have_the_same_label_and_no_label_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.store.courses.hidden_names._LABEL_LENGTH", 1)
+    students = tuple(f"student-{number}" for number in range(200))
+    labels: dict[str, str] = {}
+    for count in range(1, len(students) + 1):
+        names = HiddenNames(frozenset({"one"}), b"key", students[:count])
+        after = {student: names.label_student("one", student) for student in students[:count]}
+        assert labels.items() <= after.items()
+        labels = after
+    assert len(set(labels.values())) == len(students)
+    assert {len(label) - len("Participant ") for label in labels.values()} == {1, 12}
+    # Letters of 60 bits: the chance that two of 100,000 students have the same ones.
+    assert 100_000**2 / 2 / 32**12 < 1e-6
