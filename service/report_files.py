@@ -13,6 +13,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from service.batch_rows import build_rejected_row, build_row, describe_missing_grade
+from service.file_names import make_portable_name
 from service.grading.grade import Grade
 from service.language import ENGLISH, Language
 from service.plotting import draw_plots, load_own_floors
@@ -76,7 +77,7 @@ def write_report(
     Raises UsageError if the folder is not writable, or the reader may not see those trials.
     """
     html, drawn_plots = _render_page(store, line, grade, overlay_line, language)
-    return WrittenReport(write_page(folder, f"{stem}.html", html), drawn_plots)
+    return WrittenReport(write_page(folder, make_portable_name(f"{stem}.html"), html), drawn_plots)
 
 
 def write_grade_replay(
@@ -137,13 +138,15 @@ def write_batch_reports(
     folder is not writable.
     """
     graded_lines = [line for line in lines if not describe_missing_grade(line)]
-    names = [(line.student, line.assignment) for line in graded_lines]
     stems = [
-        *build_file_stems(names),
+        *build_file_stems([(line.student, line.assignment) for line in graded_lines]),
         *build_refused_stems([(refusal.source, refusal.student.id) for refusal in refusals]),
     ]
     pages = render_report_pages(store, graded_lines, refusals)
-    paths = [write_page(folder, f"{stem}.html", page.html) for stem, page in zip(stems, pages, strict=True)]
+    paths = [
+        write_page(folder, make_portable_name(f"{stem}.html"), page.html)
+        for stem, page in zip(stems, pages, strict=True)
+    ]
     page_names = {line.id: path.name for line, path in zip(graded_lines, paths, strict=False)}
     rows = [
         BatchRow(

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import BinaryIO
 
 from service.batch_rows import build_rows, describe_missing_grade
+from service.file_names import make_portable_name
 from service.grading.grade import Grade
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid
@@ -170,7 +171,9 @@ def _render_files(export_format: Format, rows: Sequence[TableRow[Grade]]) -> lis
         refused_rows = [row for row in rows if row.refused]
         texts += map(export_format.refusal, refused_rows)
         stems += build_refused_stems([(row.source, row.student.id) for row in refused_rows])
-    return [(f"{stem}{export_format.suffix}", text) for stem, text in zip(stems, texts, strict=True)]
+    return [
+        (make_portable_name(f"{stem}{export_format.suffix}"), text) for stem, text in zip(stems, texts, strict=True)
+    ]
 
 
 def _zip_files(files: Sequence[tuple[str, str]]) -> bytes:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from threading import BoundedSemaphore
+from threading import BoundedSemaphore, Lock
 from typing import Annotated
+from weakref import WeakValueDictionary
 
 from fastapi import Depends, Request
 
@@ -20,8 +21,25 @@ from sim.sentences import Sentence
 
 _SLOT_SECONDS = 30
 _UPLOAD_IN_PROGRESS = translatable("Another upload is in progress. Try again in a minute.")
+EXPORT_IN_PROGRESS = translatable("Another download is being prepared. Try again in a minute.")
 #: Reading one submission can take hundreds of megabytes.
 _MAX_SUBMISSIONS_READ = 3
+
+
+class PersonalSlots:
+    """A slot for each person. It exists only while somebody holds it or waits for it."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._slots: WeakValueDictionary[int | None, BoundedSemaphore] = WeakValueDictionary()
+
+    def get_slot(self, person_id: int | None) -> BoundedSemaphore:
+        """Return the slot of a person."""
+        with self._lock:
+            slot = self._slots.get(person_id)
+            if slot is None:
+                slot = self._slots[person_id] = BoundedSemaphore()
+            return slot
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +54,8 @@ class WebContext:
     reading: BoundedSemaphore = field(default_factory=partial(BoundedSemaphore, _MAX_SUBMISSIONS_READ))
     #: Held while all data of a student are put into a zip, which can take hundreds of megabytes.
     exporting: BoundedSemaphore = field(default_factory=BoundedSemaphore)
+    #: Held while a batch is exported, so that each instructor exports only one at a time.
+    batch_exports: PersonalSlots = field(default_factory=PersonalSlots)
 
     @property
     def settings(self) -> Settings:

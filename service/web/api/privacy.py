@@ -7,7 +7,6 @@ from typing import Annotated
 from fastapi import Depends
 from fastapi.responses import Response
 
-from service.language import translatable
 from service.operations import privacy
 from service.operations.privacy import StudentData
 from service.operations.types import Role
@@ -17,13 +16,11 @@ from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import api_router
 from service.web.attachments import respond_with_attachment
-from service.web.context import Context, hold_slot
+from service.web.context import EXPORT_IN_PROGRESS, Context, hold_slot
 
 router = api_router("privacy")
 ManageAccess = Annotated[CallerInCourse, Depends(require_role(Role.INSTRUCTOR, "manage"))]
 ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "read"))]
-
-_EXPORT_IN_PROGRESS = translatable("Another download is being prepared. Try again in a minute.")
 
 
 class ErasedShape(Shape):
@@ -42,7 +39,7 @@ def own_data(access: ReadAccess, context: Context) -> Response:
     Contains only the parts that the owner can see as a student.
     """
     context.limits.exports.spend(str(access.actor.person_id))
-    with hold_slot(context.exporting, _EXPORT_IN_PROGRESS):
+    with hold_slot(context.exporting, EXPORT_IN_PROGRESS):
         return _respond_with_zip(privacy.export_own(context.service, access.actor, access.course_id))
 
 
@@ -52,7 +49,7 @@ def data(access: ManageAccess, context: Context, enrolment_id: RowNumber) -> Res
 
     Assignments with hidden names are omitted.
     """
-    with hold_slot(context.exporting, _EXPORT_IN_PROGRESS):
+    with hold_slot(context.exporting, EXPORT_IN_PROGRESS):
         return _respond_with_zip(privacy.export_student(context.service, access.actor, access.course_id, enrolment_id))
 
 

@@ -20,7 +20,7 @@ from service.web.api_access import CallerInCourse, require_role
 from service.web.api_routes import NO_KEY, After, Limit, Listed, api_router, build_list_page, decode_cursor
 from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
-from service.web.context import Context, WebContext
+from service.web.context import EXPORT_IN_PROGRESS, Context, WebContext, hold_slot
 from service.web.request_bodies import takes_upload
 
 router = api_router("batches")
@@ -220,5 +220,6 @@ async def worksheet(
 def _respond_with_export(
     context: WebContext, access: CallerInCourse, batch_id: str, export_request: ExportRequest
 ) -> Response:
-    exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
+    with hold_slot(context.batch_exports.get_slot(access.actor.person_id), EXPORT_IN_PROGRESS):
+        exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
     return respond_with_attachment(exported.data, exported.name, exported.media_type)

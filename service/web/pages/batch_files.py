@@ -16,7 +16,7 @@ from service.operations.types import Role
 from service.web.access import CourseInstructor, ReaderInCourse, RowName
 from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
-from service.web.context import Context, WebContext
+from service.web.context import EXPORT_IN_PROGRESS, Context, WebContext, hold_slot
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 
@@ -57,7 +57,8 @@ def fill_worksheet(
 def _respond_with_export(
     access: ReaderInCourse, context: WebContext, batch_id: str, export_request: ExportRequest
 ) -> Response:
-    exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
+    with hold_slot(context.batch_exports.get_slot(access.actor.person_id), EXPORT_IN_PROGRESS):
+        exported = download(context.service, access.actor, access.course_id, batch_id, export_request)
     # Excel recognises UTF-8 only by a byte order mark. Moodle's worksheet stays as Moodle wrote it.
     byte_order_mark = codecs.BOM_UTF8 if export_request.form in _TABLES else b""
     return respond_with_attachment(byte_order_mark + exported.data, exported.name, exported.media_type)
