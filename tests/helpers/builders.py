@@ -20,6 +20,7 @@ from service.settings import Settings
 from service.store.batches.intake import AcceptedSubmission, accept_submission
 from service.store.engine import Store, open_store
 from service.store.grades import recordings
+from service.store.grades.results import PreparedGrade, prepare_grade
 from service.store.installation import load_secret
 from service.store.states import JobQueue
 from service.store.tables.installation import SchemaCompatibility
@@ -31,6 +32,8 @@ from submissions.grading_request import GradingRequest
 from submissions.student_identity import People
 from submissions.submission import Submission
 
+#: Grades that were compressed, with the grade itself, so that its id stays in use.
+_PREPARED: dict[int, tuple[Grade, PreparedGrade]] = {}
 PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
 
@@ -104,6 +107,17 @@ def accept_one(
     store: Store, student: str = "ada", *, lane: JobQueue = JobQueue.INTERACTIVE, max_attempts: int = 3
 ) -> AcceptedSubmission:
     return accept_submission(store, grading_request(student), lane=lane, max_attempts=max_attempts)
+
+
+def prepared(grade: Grade) -> PreparedGrade:
+    """Return the grade as jobs end with it. It is compressed once, even if many jobs get it."""
+    known_grade, prepared_grade = _PREPARED.get(id(grade), (None, None))
+    if known_grade is not grade or prepared_grade is None:
+        if len(_PREPARED) > 20:
+            _PREPARED.clear()
+        prepared_grade = prepare_grade(grade)
+        _PREPARED[id(grade)] = grade, prepared_grade
+    return prepared_grade
 
 
 def comparable(grade: Grade) -> tuple[Grade, list[bytes]]:

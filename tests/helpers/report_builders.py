@@ -10,6 +10,7 @@ import json
 import math
 from dataclasses import replace
 from decimal import Decimal
+from functools import cache
 
 import numpy as np
 
@@ -198,6 +199,11 @@ ASTRAY = (
 
 def faulty_grade() -> Grade:
     """Return a grade of a program that fails in line 3, after two messages: one answer is lost, one is never sent."""
+    return _make_faulty_grade()
+
+
+@cache
+def _make_faulty_grade() -> Grade:
     recording = line_follower_recording(45)
     faults = (
         Fault(0.4, Verdict.RESPONDER_ERROR, "responder", "NameError: name 'pasrer' is not defined", 2,

@@ -15,7 +15,7 @@ from fastapi import FastAPI
 from httpx2 import Response
 from starlette.testclient import TestClient
 
-from builders import opened, settings_in
+from builders import opened, prepared, settings_in
 from service.grading.grade import Grade
 from service.operations import people as operations
 from service.operations.context import Actor
@@ -23,7 +23,6 @@ from service.operations.people import JoinRequest
 from service.queue.broker import build_broker_url
 from service.settings import Settings
 from service.store.engine import Store
-from service.store.grades import results
 from service.store.people import credentials, membership
 from service.store.people.membership import Member
 from service.store.people.reach import Reach
@@ -121,4 +120,4 @@ def words(html: str) -> str:
 def grade_all(web: Web, grade: Grade) -> None:
     """Give all waiting jobs this grade at once, without a worker."""
     while claim := jobs.claim_job(web.store, "worker", 60):
-        jobs.finish_job(web.store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(web.store, claim, prepared(grade), datetime.now(UTC))

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, prepared
 from service.pending_uploads import PendingUploads
 from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
-from service.store.grades import appeals, results
+from service.store.grades import appeals
 from service.store.people import credentials, webhooks
 from service.store.people.membership import Member
 from service.store.queue import jobs, test_runs
@@ -108,4 +108,4 @@ def filled(path: str, values: dict[str, str]) -> str:
 def _grade_all(web: Web) -> None:
     """Grade all waiting jobs at once, without a worker."""
     while claim := jobs.claim_job(web.store, "worker", 60):
-        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(web.store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))

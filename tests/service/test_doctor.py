@@ -12,13 +12,13 @@ from sqlalchemy import text, update
 from sqlalchemy.exc import OperationalError
 
 import report_builders
-from builders import accept_one, grading_request, upgraded_by_newer_release
+from builders import accept_one, grading_request, prepared, upgraded_by_newer_release
 from service import doctor
 from service.doctor import examine_machine, examine_service
 from service.settings import Settings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
-from service.store.grades import plots, results
+from service.store.grades import plots
 from service.store.queue import jobs, metrics, test_runs, workers
 from service.store.queue.workers import WorkerDescription
 from service.store.revision import SchemaState, find_newest_revision
@@ -61,7 +61,7 @@ def test_a_backlog_between_two_jobs_is_well(
     accept_one(store, "bob")
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     with store.transaction() as session:
         at = now(session)
         session.execute(update(Job).values(queued_at=at - timedelta(minutes=10)))
@@ -112,7 +112,7 @@ def test_the_time_left_is_longer_while_others_wait(store: Store) -> None:
     ours = accept_batch(store, "ours", [grading_request(name) for name in ("ada", "bob", "cyd")], [], max_attempts=3)
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     with store.transaction() as session:
         session.execute(
             update(Job).where(Job.id == claim.job_id).values(started_at=now(session) - timedelta(minutes=1))
@@ -161,13 +161,13 @@ def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> No
         "tryout": lambda: test_runs.claim_test_run(store, 60),
         "plots": lambda: plots.claim_plots(store, 60),
     }
-    prepared = results.prepare_grade(report_builders.faulty_grade())
+    prepared_grade = prepared(report_builders.faulty_grade())
     for student in ("ada", "bob", "eve"):
         accept_one(store, student)
     finished, running = jobs.claim_job(store, "worker", 60), jobs.claim_job(store, "worker", 60)
     assert finished is not None
     assert running is not None
-    jobs.finish_job(store, finished, prepared, datetime.now(UTC))
+    jobs.finish_job(store, finished, prepared_grade, datetime.now(UTC))
     with store.transaction() as session:
         job = session.get_one(Job, running.job_id)
         test_runs.queue_test_run(session, job.enrolment_id, job.assignment_version_id, b"")
@@ -175,7 +175,7 @@ def test_nothing_is_claimed_from_tables_that_need_newer_code(store: Store) -> No
     assert [name for name, take in claims.items() if take() is not None] == []
     # Running jobs are finished.
     jobs.renew_lease(store, running, 60, 0.5)
-    jobs.finish_job(store, running, prepared, datetime.now(UTC))
+    jobs.finish_job(store, running, prepared_grade, datetime.now(UTC))
     upgraded_by_newer_release(store, find_newest_revision())
     assert [name for name, take in claims.items() if take() is not None] == list(claims)
 

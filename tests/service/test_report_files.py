@@ -12,7 +12,7 @@ from PIL import Image
 
 import acting
 import report_builders as build
-from builders import grading_request
+from builders import grading_request, prepared
 from replays import data_of, parting_grade
 from service.grading.grade import Grade
 from service.report_files import (
@@ -40,7 +40,7 @@ def stored(store: Store, student: str, program: int, grade: Grade) -> tuple[JobL
     taken = accept_batch(store, "class", [grading_request(student, f"print({program})\n")], [], max_attempts=3)
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
     return line_of(store, taken.jobs[0].job_id), taken.id
 
 

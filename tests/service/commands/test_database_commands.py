@@ -11,12 +11,11 @@ import pytest
 
 import report_builders
 from benchmarks.harness.postgresql_server import create_database
-from builders import grading_request
+from builders import grading_request, prepared
 from command import robomark
 from service.settings import Settings
 from service.store.batches.intake import accept_new_submissions
 from service.store.engine import open_store
-from service.store.grades import results
 from service.store.installation import load_secret
 from service.store.queue import jobs
 
@@ -31,7 +30,7 @@ def _graded_batch(settings: Settings) -> str:
             report_builders.shape_grade(), sandbox="Landlock 7, policy 0", secret_sha256=load_secret(store).sha256
         )
         while (claim := jobs.claim_job(store, "worker", 60)) is not None:
-            jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+            jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
         return accepted.batch.id
 
 

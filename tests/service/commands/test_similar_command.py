@@ -13,7 +13,7 @@ import pytest
 import report_builders
 from batch_command import robomark
 from benchmarks.harness.disguises import DISGUISES
-from builders import opened, settings_in
+from builders import opened, prepared, settings_in
 from responders.source_file import SourceFile
 from service.commands.batch.similar import similar
 from service.report_files import write_batch_reports
@@ -64,7 +64,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sto
                 student = job_lines.load_job_line(session, claim.job_id).student
             seconds = 30 if student in ("ada", "zebedee") else 40 + number
             grade = replace(report_builders.line_follower_grade(seconds), student=student)
-            jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+            jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
         yield home, store, batch
 
 

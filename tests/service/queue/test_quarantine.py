@@ -20,7 +20,7 @@ from sqlalchemy import select
 import false_worker
 import report_builders
 import sim.robot
-from builders import grading_request, settings_in
+from builders import grading_request, prepared, settings_in
 from processes import until
 from responders.trial_spec import ProgramSpec, ResponderSpec
 from service.grading.grade import Grade
@@ -59,7 +59,7 @@ def _take(store: Store, *students: str) -> str:
 def _grade_next(store: Store, worker: str) -> str:
     claim = jobs.claim_job(store, worker, 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     return claim.job_id
 
 
@@ -238,7 +238,7 @@ def test_what_was_graded_since_the_last_right_answer_is_graded_again_and_stays_t
 
     assert jobs.claim_job(store, "wrong", 60) is None
     with pytest.raises(jobs.LeaseLost):
-        jobs.finish_job(store, running, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(store, running, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     assert (_job(store, running.job_id).state, _job(store, running.job_id).attempt) == (JobState.QUEUED, 0)
 
     suspect, again = _job(store, bad), _job(store, done.again[0])
@@ -260,7 +260,7 @@ def test_a_job_claimed_beside_the_quarantine_cannot_be_finished(store: Store) ->
         job = session.get_one(Job, claim.job_id)
         job.state, job.lease = JobState.RUNNING, claim.lease
     with pytest.raises(jobs.LeaseLost, match="in quarantine"):
-        jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 @contextmanager

@@ -6,14 +6,14 @@ import pytest
 from sqlalchemy import update
 
 import report_builders
-from builders import grading_request
+from builders import grading_request, prepared
 from service.store import audit
 from service.store.batches.intake import accept_batch
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import HiddenNames, load_hidden_names
 from service.store.engine import Store
-from service.store.grades import appeals, results
+from service.store.grades import appeals
 from service.store.grades.appeals import MAX_TEXT_LENGTH
 from service.store.queue import jobs
 from service.store.tables.submissions import SubmissionRow
@@ -34,7 +34,7 @@ def _graded(store: Store) -> None:
 def _grade(store: Store) -> None:
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), claim.at)
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), claim.at)
 
 
 def _ask(store: Store, text: str = "Why?") -> int:

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 import acting
 import report_builders
 import service
-from builders import accept_one, grading_request
+from builders import accept_one, grading_request, prepared
 from paths import ROOT
 from processes import until
 from service.lti.keys import ensure_signing_key
@@ -28,7 +28,7 @@ from service.store.batches.intake import accept_batch
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, is_conflict, now, retry_conflicts
-from service.store.grades import appeals, overrides, results
+from service.store.grades import appeals, overrides
 from service.store.people import lti
 from service.store.people.lti import Registration
 from service.store.queue import jobs, lease_reaper, self_tests, test_runs
@@ -50,7 +50,7 @@ ROUNDS = 25
 def _finish_next(store: Store, worker: str) -> None:
     claim = jobs.claim_job(store, worker, 60)
     if claim is not None:
-        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(GRADE), datetime.now(UTC))
 
 
 @retry_conflicts

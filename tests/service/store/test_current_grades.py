@@ -11,7 +11,7 @@ from sqlalchemy import select, update
 
 import acting
 import report_builders
-from builders import grading_request
+from builders import grading_request, prepared
 from rows import quick_first
 from service.batch_rows import describe_missing_grade
 from service.lti import passback
@@ -23,7 +23,7 @@ from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store
-from service.store.grades import current_grades, overrides, results
+from service.store.grades import current_grades, overrides
 from service.store.people import lti
 from service.store.people.students import ensure_course
 from service.store.queue import jobs, self_tests
@@ -48,7 +48,7 @@ def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
     if how == "dead":
         jobs.fail_job(store, claim, "the disk is full", RetryPolicy(0.0))
     else:
-        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(GRADE), datetime.now(UTC))
 
 
 def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:

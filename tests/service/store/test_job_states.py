@@ -16,10 +16,9 @@ from sqlalchemy.orm import Session
 import acting
 import report_builders
 import service
-from builders import grading_request
+from builders import grading_request, prepared
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
-from service.store.grades import results
 from service.store.queue import jobs
 from service.store.queue.jobs import TRANSITIONS, Claim, LeaseLost, RetryPolicy, Transition
 from service.store.states import CancelReason, JobState
@@ -52,7 +51,7 @@ def _claimed(store: Store) -> Claim:
 
 
 def _finish(store: Store, claim: Claim) -> None:
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _fail(store: Store, claim: Claim, *, enough: bool) -> None:

@@ -12,14 +12,13 @@ from sqlalchemy import select, update
 import acting
 import report_builders
 from acting import service_on
-from builders import accept_one, grading_request
+from builders import accept_one, grading_request, prepared
 from naming import is_named
 from service.operations import replies
 from service.operations.context import Actor
 from service.store import ids, outbox
 from service.store.batches import intake
 from service.store.engine import Store
-from service.store.grades import results
 from service.store.people import credentials, membership, webhooks
 from service.store.people.reach import Reach
 from service.store.queue import jobs
@@ -48,7 +47,7 @@ def list_deliveries(store: Store) -> list[tuple[str, dict[str, Any]]]:
 def grade_next(store: Store) -> str:
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     return claim.job_id
 
 

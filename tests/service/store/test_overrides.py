@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 
 import acting
 import report_builders
-from builders import accept_one, grading_request
+from builders import accept_one, grading_request, prepared
 from service.batch_rows import build_rows
 from service.grading.class_statistics import to_marked_submission
 from service.grading.grade import Grade, StaffAdjustment
@@ -58,7 +58,7 @@ def _withdraw(criterion: str) -> Change:
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
     while (claim := jobs.claim_job(store, "worker", 60)) is not None:
-        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
 
 
 def _graded(store: Store, grade: Grade = GRADE) -> tuple[str, str]:

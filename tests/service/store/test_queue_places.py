@@ -9,10 +9,9 @@ from sqlalchemy import update
 
 import acting
 import report_builders
-from builders import accept_one, grading_request
+from builders import accept_one, grading_request, prepared
 from service.store.batches.intake import accept_batch, accept_submission
 from service.store.engine import Store, now
-from service.store.grades import results
 from service.store.queue import jobs, workers
 from service.store.queue.queue_places import QueuePlace, estimate_place
 from service.store.queue.workers import WorkerDescription
@@ -60,7 +59,7 @@ def test_the_time_left_follows_from_what_gradings_took_and_how_many_run_at_once(
     graded = accept_one(store, "ada").job_id
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     with store.transaction() as session:
         ended = datetime(2026, 1, 1, tzinfo=UTC)
         taken = {"started_at": ended - timedelta(seconds=8), "finished_at": ended}

@@ -11,11 +11,10 @@ from sqlalchemy.exc import IntegrityError
 
 import acting
 import report_builders
-from builders import accept_one, grading_request
+from builders import accept_one, grading_request, prepared
 from rows import quick_first
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
-from service.store.grades import results
 from service.store.queue import jobs, self_tests
 from service.store.states import JobState, Standing
 from service.store.tables.submissions import Job
@@ -27,7 +26,7 @@ GRADE = report_builders.faulty_grade()
 def _grade_next(store: Store, worker: str) -> bool:
     claim = jobs.claim_job(store, worker, 60)
     if claim is not None:
-        jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(GRADE), datetime.now(UTC))
     return claim is not None
 
 

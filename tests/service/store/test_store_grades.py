@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import select, text, update
 
 import report_builders
-from builders import accept_one, comparable
+from builders import accept_one, comparable, prepared
 from responders.sandbox.meter import JobCosts, JobLimits
 from service.grading.grade import Cost, Grade, VisibleFeedback, convert_texts
 from service.reports.formats.json_output import build_json_document
@@ -37,7 +37,7 @@ def _stored(store: Store, grade: Grade) -> str:
     accepted = accept_one(store, grade.student)
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
     with store.transaction() as session:
         version = {"assignment": grade.assignment, "title": grade.assignment_title, "version": grade.assignment_version}
         session.execute(update(AssignmentVersion).values(**version))

@@ -12,14 +12,14 @@ from sqlalchemy import func, select, update
 
 import acting
 import report_builders
-from builders import accept_one, grading_request, settings_in
+from builders import accept_one, grading_request, prepared, settings_in
 from command import FORKING
 from service.operations.batches import BatchControlResult
 from service.settings import Settings
 from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.grades import plots, results
+from service.store.grades import plots
 from service.store.queue import jobs
 from service.store.queue.jobs import Claim, LeaseLost, RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, mark_notified, requeue_lost_jobs
@@ -51,7 +51,7 @@ def _claim(store: Store, worker: str = "worker") -> Claim:
 
 
 def _finish(store: Store, claim: Claim) -> None:
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def _rows(store: Store) -> tuple[int, int]:

@@ -16,7 +16,7 @@ from sqlalchemy import func, insert, inspect, select, text
 
 import acting
 import report_builders
-from builders import accept_one, upgraded_by_newer_release
+from builders import accept_one, prepared, upgraded_by_newer_release
 from command import FORKING
 from first_release import lay_first_release, lay_release_0_2_0
 from service.settings import Settings
@@ -175,7 +175,7 @@ def test_a_database_of_the_first_release_is_upgraded_with_its_data(service_setti
         # The new release grades the waiting job, and new jobs get the next numbers.
         waiting = jobs.claim_job(store, "worker", 60)
         assert waiting is not None
-        jobs.finish_job(store, waiting, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(store, waiting, prepared(report_builders.faulty_grade()), datetime.now(UTC))
         assert accept_one(store, "ada").attempt == 3
 
 
@@ -212,7 +212,7 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
             assert set(names) == {"ada", "Bob 🤖", "cyd", "dan"}
         # The new release grades, publishes and extends the old regrades.
         while claim := jobs.claim_job(store, "worker", 60):
-            jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+            jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
         acting.publish(store, batch, includes_unjudged=True)
         assert accept_one(store, "eve").attempt == 1
 

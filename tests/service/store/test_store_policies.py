@@ -11,14 +11,13 @@ from sqlalchemy import select
 
 import acting
 import report_builders
-from builders import grading_request
+from builders import grading_request, prepared
 from service.operations.regrades import PublicationCounts
 from service.store.batches import job_lines
 from service.store.batches.intake import AcceptedSubmission, accept_batch, accept_new_submissions, accept_submission
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
 from service.store.engine import Store, now
-from service.store.grades import results
 from service.store.people.students import Students, ensure_course
 from service.store.queue import jobs
 from service.store.states import JobQueue, JobState
@@ -61,7 +60,7 @@ def _grade_all(store: Store, verdict: Verdict | None = None) -> None:
         (trial, *rest) = GRADE.trials
         grade = replace(GRADE, trials=(replace(trial, recording=replace(trial.recording, verdict=verdict)), *rest))
     while (claim := jobs.claim_job(store, "worker", 60)) is not None:
-        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
 
 
 def test_without_a_policy_everything_counts(store: Store) -> None:

@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 from decimal import Decimal
 
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, prepared
 from service.grading.grade import CriterionResult, Evidence, Measure
 from service.store.batches import job_lines, rankings
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
-from service.store.grades import overrides, results
+from service.store.grades import overrides
 from service.store.queue import jobs
 from submissions.assignment.reader import find_assignment
 from submissions.grading_request import GradingRequest
@@ -32,7 +32,7 @@ def graded(store: Store, requests: list[GradingRequest], laps: dict[str, tuple[f
         )
         fast = CriterionResult("fast", "Drives it fast", Decimal(1), Decimal(5), "", evidence=evidence)
         grade = replace(report_builders.line_follower_grade(3), criteria=(fast,))
-        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
     return batch
 
 

@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, select, update
 
 import acting
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, prepared
 from service.commands.batch.batch_summary import describe_unjudged
 from service.grading.grade import Grade
 from service.operations.regrades import PublicationCounts
@@ -48,7 +48,7 @@ def _batch(store: Store, *students: str) -> str:
 
 def _grade_all(store: Store, grade: Grade = GRADE) -> None:
     while (claim := jobs.claim_job(store, "worker", 60)) is not None:
-        jobs.finish_job(store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(store, claim, prepared(grade), datetime.now(UTC))
 
 
 def _regrade(store: Store, batch: str, grade: Grade = GRADE, *, changed: bool = False) -> str:
@@ -256,7 +256,7 @@ def test_what_is_not_graded_and_other_assignments_are_left_out(store: Store) -> 
     jobs.give_up_job(store, claim, "no program")
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
-    jobs.finish_job(store, claim, results.prepare_grade(GRADE), datetime.now(UTC))
+    jobs.finish_job(store, claim, prepared(GRADE), datetime.now(UTC))
     other = replace(echo(), id="other")
     with pytest.raises(UsageError, match="has no submission for other, only for echo-responder"):
         acting.regrade(store, batch, other, max_attempts=3, actor="staff")

@@ -9,13 +9,13 @@ import pytest
 from sqlalchemy import update
 
 import report_builders
-from builders import accept_one
+from builders import accept_one, prepared
 from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import phases
 from service.store.engine import Store
-from service.store.grades import plots, results
+from service.store.grades import plots
 from service.store.queue import jobs, metrics, workers
 from service.store.queue.jobs import RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, requeue_lost_jobs
@@ -87,7 +87,7 @@ def test_the_times_of_a_grade_are_kept_and_told(store: Store) -> None:
     claim = jobs.claim_job(store, "worker", 60)
     assert claim is not None
     trials_at, graded_at = claim.at + timedelta(seconds=2), claim.at + timedelta(seconds=3)
-    jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), graded_at, trials_at)
+    jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), graded_at, trials_at)
     plots.store_plots(store, job_id, {})
     job = _job(store, job_id)
     assert (job.state, set(job.phases)) == (JobState.DONE, set(phases.NAMES))

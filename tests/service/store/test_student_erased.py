@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 import acting
 import report_builders
-from builders import grading_request, settings_in
+from builders import grading_request, prepared, settings_in
 from service.operations import privacy
 from service.pending_uploads import PendingUploads
 from service.store import audit
@@ -51,7 +51,7 @@ def submit(store: Store, *students: Student, refused: str = "") -> None:
     refusals = (RejectedSubmission("x.zip", "is empty", Student(refused)),) if refused else ()
     intake.accept_batch(store, "batch", requests, refusals, course="default", max_attempts=3)
     while claim := jobs.claim_job(store, "worker", 60):
-        jobs.finish_job(store, claim, results.prepare_grade(report_builders.faulty_grade()), NOW)
+        jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), NOW)
 
 
 def everything(store: Store) -> int:

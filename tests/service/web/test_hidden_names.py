@@ -15,7 +15,7 @@ import pytest
 
 import acting
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, prepared
 from naming import is_named
 from service.operations import privacy, sign_in_links
 from service.operations.context import create_machine_actor
@@ -23,7 +23,6 @@ from service.store.batches import intake, regrades
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import HiddenNames, load_hidden_names
-from service.store.grades import results
 from service.store.people.membership import Member
 from service.store.queue import jobs
 from web import COURSE, Web, submit, web_in, words
@@ -61,7 +60,7 @@ def regrade(web: Web, grace: Member) -> str:
 
 def _grade_all(web: Web) -> None:
     while claim := jobs.claim_job(web.store, "worker", 60):
-        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(web.store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
 
 
 def test_changes_of_a_regrade_are_in_the_order_of_the_shown_names(web: Web, grace: Member, regrade: str) -> None:

@@ -19,7 +19,7 @@ from sqlalchemy import func, select, update
 from starlette.testclient import TestClient
 
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, prepared
 from lti_platform import CLIENT, INSTRUCTOR, ISSUER, LEARNER, LearningPlatform, learning_platform
 from service.lti.launch import CLAIM
 from service.operations import platforms
@@ -29,7 +29,6 @@ from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import Store
-from service.store.grades import results
 from service.store.people import lti, membership
 from service.store.people.lti import Registration
 from service.store.queue import jobs
@@ -308,7 +307,7 @@ def test_members_are_enrolled_and_published_marks_sent(launched: tuple[Web, Lear
     requests = [grading_request("ada"), grading_request("unknown")]
     intake.accept_batch(web.store, "b", requests, (), course="Robotics", max_attempts=3)
     while claim := jobs.claim_job(web.store, "worker", 60):
-        jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+        jobs.finish_job(web.store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     send = {CSRF_FIELD: word, "assignment": "echo-responder"}
     assert "0 published marks" in grace.post("/courses/1/platform/marks", data=send).text
     assert platform.scores == []

@@ -16,11 +16,10 @@ from sqlalchemy import update
 from starlette.testclient import TestClient
 
 import report_builders
-from builders import PROGRAM, echo
+from builders import PROGRAM, echo, prepared
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
-from service.store.grades import results
 from service.store.people.membership import Member
 from service.store.queue import jobs, workers
 from service.store.queue.workers import WorkerDescription
@@ -82,7 +81,7 @@ def _grade(web: Web, marks: str = "1") -> None:
     after = replace(first, id="after", title="Secret criterion", visibility="after_published")
     grade = replace(grade, criteria=(first, after))
     while claim := jobs.claim_job(web.store, "worker", 60):
-        jobs.finish_job(web.store, claim, results.prepare_grade(grade), datetime.now(UTC))
+        jobs.finish_job(web.store, claim, prepared(grade), datetime.now(UTC))
 
 
 def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) -> None:
@@ -337,5 +336,5 @@ def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member
     assert claim is not None
     jobs.renew_lease(web.store, claim, 60, 0.5)
     assert "This submission is being graded." in first.get(mine).text
-    jobs.finish_job(web.store, claim, results.prepare_grade(report_builders.faulty_grade()), datetime.now(UTC))
+    jobs.finish_job(web.store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     _grade(web)
