@@ -19,6 +19,7 @@ from service.operations import people as people_operations
 from service.operations.assignments import CourseAssignment
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.policies import ExtensionRequest, PolicyLimits
+from service.operations.types import CountedAttempt
 from sim.errors import UsageError
 from submissions.roster import parse_time
 from submissions.student_identity import list_known_students, read_people
@@ -47,9 +48,16 @@ def policy(
     drop: Annotated[
         bool, typer.Option("--drop", help="Remove the policy. The policy for all assignments applies.")
     ] = False,
+    counted_attempt: Annotated[
+        CountedAttempt | None,
+        typer.Option(help="The attempt of each student that counts, for all assignments of the course."),
+    ] = None,
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
-    """Set the deadline and attempts, replacing the earlier policy. Without options, show the policy."""
+    """Set the deadline and attempts, replacing the earlier policy. Without options, show the policy.
+
+    The attempt that counts is set separately: other options do not change it, and it does not replace a policy.
+    """
     limits = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
     if drop and limits != PolicyLimits():
         raise UsageError("--drop removes all limits, expected no other limits with it")
@@ -59,7 +67,11 @@ def policy(
             policies.drop_policy(service, actor, course_id, assignment)
         elif limits != PolicyLimits():
             policies.set_policy(service, actor, course_id, assignment, limits)
-        _show_policies(policies.list_policies(service, actor, course_id))
+        if counted_attempt is not None:
+            policies.set_counted_attempt(service, actor, course_id, counted_attempt)
+        _show_policies(
+            policies.list_policies(service, actor, course_id), policies.show_counted_attempt(service, actor, course_id)
+        )
 
 
 def extend(
@@ -192,8 +204,12 @@ def _parse_due(text: str | None) -> datetime | None:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _show_policies(limits_by_assignment: dict[str, PolicyLimits]) -> None:
-    print_json(policies=[{"assignment": name, **asdict(allowed)} for name, allowed in limits_by_assignment.items()])
+def _show_policies(limits_by_assignment: dict[str, PolicyLimits], counted_attempt: CountedAttempt) -> None:
+    print_json(
+        policies=[{"assignment": name, **asdict(allowed)} for name, allowed in limits_by_assignment.items()],
+        counted_attempt=counted_attempt,
+    )
+    print_line(f"attempt that counts: {counted_attempt.value}")
     if not limits_by_assignment:
         print_line("no policy: all submissions are marked at any time")
         return

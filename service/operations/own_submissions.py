@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from decimal import Decimal
 
-from sqlalchemy import ColumnElement, Select, and_, func, literal, or_, select, tuple_
+from sqlalchemy import ColumnElement, Select, and_, case, func, literal, or_, select, tuple_
 from sqlalchemy.orm import Session, aliased
 
 from service.grading.grade import Grade
@@ -22,7 +22,15 @@ from service.store.courses.policies import ExceededLimit, OverLimit, PolicyLimit
 from service.store.engine import now
 from service.store.grades import appeals, current_grades, results
 from service.store.grades.appeals import AppealLine
-from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
+from service.store.states import (
+    UNFINISHED,
+    BatchState,
+    CancelReason,
+    CountedAttempt,
+    JobState,
+    PlotState,
+    Standing,
+)
 from service.store.tables.courses import AssignmentVersion
 from service.store.tables.submissions import Batch, Job, SubmissionRow
 
@@ -52,7 +60,7 @@ class OwnSubmission:
     published: bool  # the whole grade is released
     plots: PlotState
     shown: bool  # its student may see its grade
-    counts: bool  # its marks count for its assignment
+    counts: bool  # its marks count for its assignment, and its student may know it
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
     max_marks: Decimal | None = None
@@ -65,9 +73,10 @@ class OwnSubmission:
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """A student's remaining attempts and time for an assignment."""
+    """A student's remaining attempts and time for an assignment, and the course's rule for the attempt that counts."""
 
     limits: PolicyLimits
+    counted_attempt: CountedAttempt
     attempts_made: int
     left: timedelta | None  # until the student's due date; negative after it, None without one
     late_left: timedelta | None  # until late submissions stop counting
@@ -117,7 +126,7 @@ class OwnAssignment:
     open: bool
     allowance: Allowance
     newest: OwnSubmission | None
-    counting: OwnSubmission | None  # the newest that is graded and within the limits
+    counting: OwnSubmission | None  # the one whose marks count
     appeal: AppealLine | None  # the newest
 
 
@@ -204,9 +213,11 @@ def compute_allowances(session: Session, enrolment_id: int, assignments: Collect
     """Return ``allowance`` for several assignments, with the same number of statements."""
     limits, current_time = policies.load_limits_by_assignment(session, enrolment_id, assignments), now(session)
     attempt_counts = policies.count_attempts(session, enrolment_id, assignments)
+    counted_attempt = policies.load_counted_attempt(session, enrolment_id)
     return {
         each: Allowance(
             limits[each],
+            counted_attempt,
             attempt_counts[each],
             None if (due_at := limits[each].due_at) is None else due_at - current_time,
             None if (closed_at := limits[each].closed_at) is None else closed_at - current_time,
@@ -215,7 +226,7 @@ def compute_allowances(session: Session, enrolment_id: int, assignments: Collect
     }
 
 
-_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool]
+_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool, str | None]
 
 
 def _select_attempts(
@@ -266,6 +277,7 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
         )
         .scalar_subquery()
     )
+    is_best, select_unpublished = current_grades.match_best_counts(), current_grades.select_unpublished_job
     return (
         select(
             SubmissionRow,
@@ -274,7 +286,8 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
             Batch.state,
             same_attempt,
             and_(*current_grades.CAN_COUNT),
-            _is_counting(enrolment_id),
+            and_(_is_counting(enrolment_id), or_(~is_best, select_unpublished("hidden", "after_published").is_(None))),
+            case((is_best, select_unpublished("after_due_date"))),
         )
         .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
@@ -284,12 +297,25 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
 
 
 def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSubmission]:
-    submissions = [_build_submission(*row) for row in session.execute(query)]
+    """Return the submissions with their visible marks.
+
+    The best attempt is the one that counts only if its student sees all marks that decide this: hidden marks could
+    otherwise be found by comparing attempts.
+    """
+    rows = session.execute(query).all()
+    submissions = [_build_submission(*row[:7]) for row in rows]
     visible_job_ids = [each.job_id for each in submissions if each.shown]
+    due_job_ids = {row[7] for row in rows if row[7] is not None}
     grades_by_job, visibilities_by_job = (
         results.load_marks(session, visible_job_ids),
-        policies.load_visibilities_by_job(session, visible_job_ids),
+        policies.load_visibilities_by_job(session, {*visible_job_ids, *due_job_ids}),
     )
+    undecided = {
+        submission.id
+        for submission, row in zip(submissions, rows, strict=True)
+        if row[7] is not None and "after_due_date" not in visibilities_by_job[row[7]]
+    }
+    submissions = [replace(each, counts=False) if each.id in undecided else each for each in submissions]
     return [
         _add_marks(each, grades_by_job[each.job_id], visibilities_by_job[each.job_id])
         if each.job_id in grades_by_job

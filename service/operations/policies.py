@@ -1,4 +1,4 @@
-"""Deadlines and attempts: the policies of a course, and extensions for single students."""
+"""Deadlines and attempts: the policies of a course, extensions for single students, and the attempt that counts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from service.store import audit
 from service.store.courses import policies
 from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
-from service.store.states import Role
+from service.store.states import CountedAttempt, Role
 
 _MAX_LATE_DAYS, _MAX_ATTEMPTS, _MAX_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
@@ -67,6 +67,19 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
             attempts=limits.attempts,
             cool_down_seconds=limits.cool_down_seconds,
         )
+
+
+def show_counted_attempt(service: Service, actor: Actor, course_id: int) -> CountedAttempt:
+    """Return the rule of a course for the attempt that counts. Raises NotFound."""
+    with service.store.reading() as session:
+        return require_course(session, actor, course_id, Role.INSTRUCTOR).counted_attempt
+
+
+def set_counted_attempt(service: Service, actor: Actor, course_id: int, rule: CountedAttempt) -> None:
+    """Set the attempt of each student that counts, for all assignments and existing submissions. Raises NotFound."""
+    with service.store.transaction() as session:
+        require_course(session, actor, course_id, Role.INSTRUCTOR).counted_attempt = rule
+        audit.record_action(session, actor.name, "policy", "course", str(course_id), counted_attempt=rule.value)
 
 
 def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str) -> None:

@@ -15,6 +15,13 @@ class Role(StrEnum):
     INSTRUCTOR = "instructor"
 
 
+class CountedAttempt(StrEnum):
+    """The rule of a course for the attempt that counts, among the graded ones within the limits."""
+
+    LATEST = "latest"
+    BEST = "best"  # the highest share of the maximum marks; the latest of several
+
+
 class CredentialKind(StrEnum):
     """The kind of a credential."""
 

@@ -18,8 +18,9 @@ from sqlalchemy.orm import Session
 from service.store.conditional_insert import insert_if_new
 from service.store.courses.local_days import add_days, count_days_after, find_local_zone
 from service.store.engine import now
-from service.store.states import JobState
-from service.store.tables.courses import Extension, Policy
+from service.store.grades import current_grades
+from service.store.states import CountedAttempt, JobState
+from service.store.tables.courses import Course, Extension, Policy
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 
@@ -199,6 +200,12 @@ def load_policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
     return {row.assignment: _build_limits(row) for row in rows}
 
 
+def load_counted_attempt(session: Session, enrolment_id: int) -> CountedAttempt:
+    """Return the rule of a student's course for the attempt that counts."""
+    query = select(Course.counted_attempt).join(Enrolment, Enrolment.course_id == Course.id)
+    return session.scalars(query.where(Enrolment.id == enrolment_id)).one()
+
+
 def extend_policy(
     session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int
 ) -> None:
@@ -279,10 +286,15 @@ def _load_attempt_times(
 ) -> dict[str, dict[str, datetime]]:
     """Return the submission times of different submissions that count as attempts, by assignment and hash.
 
-    A submission counts if its grading started and did not end with a fault of the assignment or the host.
+    A submission counts if its grading started and did not end with a fault of the assignment or the host. Where the
+    best attempt counts, queued submissions count, too, because a newer one does not replace them.
     """
     submission = SubmissionRow
-    counts = or_(Job.state == JobState.RUNNING, (Job.state == JobState.DONE) & Job.verdict.not_in(_UNCOUNTED_VERDICTS))
+    counts = or_(
+        Job.state == JobState.RUNNING,
+        (Job.state == JobState.DONE) & Job.verdict.not_in(_UNCOUNTED_VERDICTS),
+        (Job.state == JobState.QUEUED) & current_grades.match_best_counts(),
+    )
     submission_moment = func.coalesce(submission.submitted_at, submission.created_at)
     query = (
         select(submission.assignment, submission.sha256, submission_moment)

@@ -1,7 +1,8 @@
 """Visibility of grades, and the current attempt of each student and assignment. The only definition of both.
 
 The states "trusted", "for students" and "can count" are each defined as a predicate and as an SQL expression; a test
-compares the two. The current attempt is the newest that can count, regardless of how it was submitted.
+compares the two. The current attempt is the latest or the best that can count, by the rule of the course, regardless of
+how it was submitted. The best has the highest share of its maximum marks, as adjusted by staff; of several, the latest.
 """
 
 from __future__ import annotations
@@ -9,10 +10,13 @@ from __future__ import annotations
 from functools import cache
 from typing import Protocol
 
-from sqlalchemy import ColumnElement, Select, Subquery, and_, case, func, or_, select, tuple_
+from sqlalchemy import ColumnElement, Float, Select, Subquery, and_, case, cast, exists, func, or_, select, tuple_
 from sqlalchemy.orm import aliased
 
-from service.store.states import JobState, Standing
+from service.store.states import CountedAttempt, JobState, Standing
+from service.store.tables.courses import Course
+from service.store.tables.grades import CriterionResultRow
+from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 
 #: Condition on a job: it is graded, and its worker is not known to grade incorrectly.
@@ -21,6 +25,10 @@ IS_TRUSTED: tuple[ColumnElement[bool], ...] = (Job.state == JobState.DONE, Job.s
 IS_FOR_STUDENTS: tuple[ColumnElement[bool], ...] = (*IS_TRUSTED, SubmissionRow.staff_only.is_(None))
 #: Condition on a job joined with its submission: its student may see the grade, and it can count.
 CAN_COUNT: tuple[ColumnElement[bool], ...] = (*IS_FOR_STUDENTS, Job.standing == Standing.STANDS)
+
+
+#: Shares of marks are compared in billionths: equal shares of different maxima can differ as floats.
+_SHARE_UNITS = 10**9
 
 
 class JobStatus(Protocol):
@@ -47,6 +55,41 @@ def is_trusted(job: JobStatus) -> bool:
 def is_for_students(attempt: AttemptStatus) -> bool:
     """Return whether ``IS_FOR_STUDENTS`` applies."""
     return is_trusted(attempt) and attempt.staff_only is None
+
+
+def match_best_counts() -> ColumnElement[bool]:
+    """Return the condition that the best attempt counts in the course of a ``SubmissionRow``."""
+    best_course = exists().where(
+        Enrolment.id == SubmissionRow.enrolment_id,
+        Course.id == Enrolment.course_id,
+        Course.counted_attempt == CountedAttempt.BEST,
+    )
+    return best_course.correlate(SubmissionRow)
+
+
+def select_unpublished_job(*visibilities: str) -> ColumnElement[str | None]:
+    """Return an unpublished job of the student and assignment of a ``SubmissionRow``; None without one.
+
+    It has a criterion with one of these visibilities, and its attempt can count.
+    """
+    attempt, job = aliased(SubmissionRow), aliased(Job)
+    return (
+        select(func.min(job.id))
+        .join(attempt, job.submission_id == attempt.id)
+        .join(CriterionResultRow, CriterionResultRow.job_id == job.id)
+        .where(
+            attempt.enrolment_id == SubmissionRow.enrolment_id,
+            attempt.assignment == SubmissionRow.assignment,
+            attempt.staff_only.is_(None),
+            job.state == JobState.DONE,
+            job.suspect.is_(None),
+            job.standing == Standing.STANDS,
+            job.published_at.is_(None),
+            CriterionResultRow.visibility.in_(visibilities),
+        )
+        .correlate(SubmissionRow)
+        .scalar_subquery()
+    )
 
 
 def select_counted_submissions(*conditions: ColumnElement[bool]) -> Select[int]:
@@ -94,7 +137,9 @@ def select_newer_attempt() -> ColumnElement[int | None]:
 
 def _select_ranked(*conditions: ColumnElement[bool]) -> Subquery:
     counts = case((and_(*CAN_COUNT), 1), else_=0)
-    rank_order = (counts.desc(), SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc())
+    rank_order = (
+        counts.desc(), _compute_best_share().desc(), SubmissionRow.staff_only.is_not(None), SubmissionRow.attempt.desc()
+    )  # fmt: skip
     pair = (SubmissionRow.enrolment_id, SubmissionRow.assignment)
     rank = func.row_number().over(partition_by=pair, order_by=rank_order).label("place")
     return (
@@ -103,3 +148,13 @@ def _select_ranked(*conditions: ColumnElement[bool]) -> Subquery:
         .where(*conditions)
         .subquery()
     )
+
+
+def _compute_best_share() -> ColumnElement[int]:
+    """Return the share of the maximum marks, in billionths, where the best attempt counts.
+
+    It is -1 for attempts that cannot count and for completely excused ones, and everywhere else.
+    """
+    can_have_share = and_(*CAN_COUNT, Job.max_marks > 0, match_best_counts())
+    share = cast(Job.marks, Float) / cast(Job.max_marks, Float)
+    return case((can_have_share, func.round(share * _SHARE_UNITS)), else_=-1)

@@ -36,7 +36,7 @@ CREATE INDEX ix_audit_subject_subject_id ON audit (subject, subject_id);
 CREATE TABLE course (
 	id INTEGER NOT NULL, 
 	name TEXT NOT NULL, 
-	created_at DATETIME NOT NULL, 
+	created_at DATETIME NOT NULL, counted_attempt VARCHAR(16) DEFAULT 'latest' NOT NULL, 
 	CONSTRAINT pk_course PRIMARY KEY (id), 
 	CONSTRAINT uq_course_name UNIQUE (name)
 );

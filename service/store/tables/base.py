@@ -14,7 +14,17 @@ from sqlalchemy import Enum, MetaData
 from sqlalchemy.orm import DeclarativeBase
 
 from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
-from service.store.states import BatchState, CancelReason, CredentialKind, JobQueue, JobState, PlotState, Role, Standing
+from service.store.states import (
+    BatchState,
+    CancelReason,
+    CountedAttempt,
+    CredentialKind,
+    JobQueue,
+    JobState,
+    PlotState,
+    Role,
+    Standing,
+)
 
 
 def _build_enum_type(kind: type[StrEnum]) -> Enum:
@@ -45,6 +55,7 @@ class Base(DeclarativeBase):
         str: SafeText(),
         Any: SafeJson(),
         Role: _build_enum_type(Role),
+        CountedAttempt: _build_enum_type(CountedAttempt),
         CredentialKind: _build_enum_type(CredentialKind),
         JobQueue: _build_enum_type(JobQueue),
         JobState: _build_enum_type(JobState),

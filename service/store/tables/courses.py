@@ -14,6 +14,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import generate_id
+from service.store.states import CountedAttempt
 from service.store.tables.base import Base
 
 
@@ -25,6 +26,10 @@ class Course(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(unique=True)
     created_at: Mapped[datetime]
+    # Older releases add courses without the column.
+    counted_attempt: Mapped[CountedAttempt] = mapped_column(
+        default=CountedAttempt.LATEST, server_default=CountedAttempt.LATEST.value
+    )
 
 
 class AssignmentVersion(Base):

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
 from service.operations import people, people_views, policies
 from service.operations.policies import ExtensionRequest, PolicyLimits
-from service.operations.types import JobState, Role
+from service.operations.types import CountedAttempt, JobState, Role
 from service.web.access import RowNumber
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
@@ -128,6 +128,20 @@ class PolicyShape(Shape):
     )
 
 
+class CountedAttemptShape(Shape):
+    """The rule of a course for the attempt that counts, among a student's graded attempts within the limits."""
+
+    counted_attempt: CountedAttempt = Field(
+        description="`latest`, or `best`: the highest share of the maximum marks, and the latest of several."
+    )
+
+    model_config = build_example_config(counted_attempt="best")
+
+
+class CountedAttemptBody(CountedAttemptShape):
+    """The new rule for the attempt that counts."""
+
+
 class PolicyBody(PolicyShape):
     """The new policy."""
 
@@ -222,6 +236,20 @@ def set_policy(access: ManageAccess, context: Context, body: PolicyBody) -> Poli
     policy_limits = PolicyLimits(body.due_at, body.late_days, body.attempts, body.cool_down_seconds)
     policies.set_policy(context.service, access.actor, access.course_id, body.assignment, policy_limits)
     return _to_policy_shape(body.assignment, policy_limits)
+
+
+@router.get("/courses/{course_id}/policies/counted-attempt")
+def show_counted_attempt(access: ReadAccess, context: Context) -> CountedAttemptShape:
+    """Return which attempt of each student counts."""
+    rule = policies.show_counted_attempt(context.service, access.actor, access.course_id)
+    return CountedAttemptShape(counted_attempt=rule)
+
+
+@router.put("/courses/{course_id}/policies/counted-attempt")
+def set_counted_attempt(access: ManageAccess, context: Context, body: CountedAttemptBody) -> CountedAttemptShape:
+    """Set which attempt of each student counts. The rule applies to all assignments and to existing submissions."""
+    policies.set_counted_attempt(context.service, access.actor, access.course_id, body.counted_attempt)
+    return CountedAttemptShape(counted_attempt=body.counted_attempt)
 
 
 @router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)

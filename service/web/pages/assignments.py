@@ -16,7 +16,7 @@ from service.operations import assignment_uploads, assignment_views, assignments
 from service.operations.assignment_uploads import AssignmentAlreadySeen, UploadRequest
 from service.operations.assignments import CourseAssignment
 from service.operations.policies import PolicyLimits
-from service.operations.types import Role
+from service.operations.types import CountedAttempt, Role
 from service.pending_uploads import clean_file_name
 from service.web.access import CourseInstructor, ReaderInCourse
 from service.web.api_uploads import MAX_ASSIGNMENT_BYTES
@@ -176,6 +176,15 @@ def set_policy(
     return RedirectResponse(f"{_build_path(access, assignment)}?done=policy", 303)
 
 
+@router.post("/policy/counted-attempt")
+def set_counted_attempt(
+    access: CourseInstructor, context: Context, counted_attempt: Annotated[CountedAttempt, Form()]
+) -> Response:
+    """Set which attempt of each student counts, in the whole course."""
+    policies.set_counted_attempt(context.service, access.actor, access.course_id, counted_attempt)
+    return RedirectResponse(f"{_build_path(access, '')}?done=counted-attempt", 303)
+
+
 @router.post("/assignments/{assignment}/no-policy")
 def drop_policy(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Delete an assignment's own policy, so that the course's default applies."""
@@ -204,6 +213,7 @@ def _render_list(
         catalogue=len(list_catalogue_ids()),
         policies=view.policies,
         policy=view.policy,
+        counted_attempt=view.counted_attempt,
         rejection=rejection or [],
         asks_to_replace=asks_to_replace,
         done=done,

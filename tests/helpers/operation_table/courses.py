@@ -195,11 +195,23 @@ def _own_assignment() -> bytes:
         return zipped({f"mine/{each.name}": each.read_bytes() for each in folder.iterdir() if each.is_file()})
 
 
+def _counted_attempt(rule: str, refused: tuple[int, str] | None = None) -> Row:
+    return Row(
+        policies.set_counted_attempt,
+        ("policy/counted-attempt", {"counted_attempt": rule}),
+        ("PUT", "policies/counted-attempt", {"counted_attempt": rule}),
+        f"course policy --counted-attempt {rule}",
+        refused=refused,
+    )
+
+
 ROWS = {
     "set the policy of a course": _policy(),
     "set the policy of an assignment": _policy(assignment="echo-responder"),
     "set the policy of no assignment": _policy((422, "echo-typo"), assignment="echo-typo"),
     "set a deadline in another century": _policy((422, ""), due="2999-01-02T10:00"),
+    "count the best attempt": _counted_attempt("best"),
+    "count the worst attempt": _counted_attempt("worst", (422, "")),
     "drop a policy": Row(
         policies.drop_policy,
         ("assignments/echo-responder/no-policy", {}),

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
 from datetime import UTC, datetime
+from decimal import Decimal
+from fractions import Fraction
 
 import pytest
 from sqlalchemy import select, update
@@ -28,11 +31,15 @@ from service.store.people import lti
 from service.store.people.students import ensure_course
 from service.store.queue import jobs, self_tests
 from service.store.queue.jobs import RetryPolicy
-from service.store.states import JobState, Standing
+from service.store.states import CancelReason, CountedAttempt, JobState, Standing
+from service.store.tables.courses import Course
+from service.store.tables.grades import CriterionResultRow
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 
-GRADE = report_builders.faulty_grade()
+_FIRST = report_builders.faulty_grade().criteria[0]
+_SECOND = replace(_FIRST, id="second", marks=Decimal(3), max_marks=Decimal(6))
+GRADE = replace(report_builders.faulty_grade(), criteria=(_FIRST, _SECOND))
 NOBODY = HiddenNames(frozenset(), b"")
 
 
@@ -49,6 +56,27 @@ def _end_next(store: Store, how: str = "done", worker: str = "worker") -> None:
         jobs.fail_job(store, claim, "the disk is full", RetryPolicy(0.0))
     else:
         jobs.finish_job(store, claim, prepared(GRADE), datetime.now(UTC))
+
+
+def _set_rule(store: Store, rule: CountedAttempt) -> None:
+    with store.transaction() as session:
+        ensure_course(session, "default", datetime.now(UTC))
+        session.get_one(Course, 1).counted_attempt = rule
+
+
+def _grade_with(store: Store, program: str, marks: int, batch_id: str | None = None) -> str:
+    """Submit and grade an attempt of Ada whose first criterion staff give ``marks``."""
+    job_id = _submit(store, program, batch_id)
+    _end_next(store)
+    with store.transaction() as session:
+        overrides.set_marks(session, job_id, GRADE.criteria[0].id, Decimal(marks), "read again", "grace")
+    return job_id
+
+
+def _share(job: Job) -> Fraction:
+    assert job.marks is not None
+    assert job.max_marks is not None
+    return Fraction(job.marks) / Fraction(job.max_marks) if job.max_marks else Fraction(-1)
 
 
 def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
@@ -104,24 +132,48 @@ def test_a_batch_shows_the_attempt_that_counts_from_wherever_it_came(store: Stor
     assert (own.id, own.attempt) == (old.jobs[0].job_id, 1)
 
 
+def _change_some_marks(store: Store, chance: random.Random) -> None:
+    """Let staff give marks for one criterion of one grade, or excuse all of its criteria or one."""
+    with store.transaction() as session:
+        job_ids = session.scalars(select(Job.id).where(Job.state == JobState.DONE).order_by(Job.id)).all()
+        if not job_ids:
+            return
+        job_id, criterion = chance.choice(job_ids), chance.choice(GRADE.criteria)
+        match chance.choice(("set", "set", "excuse one", "excuse all")):
+            case "set":
+                marks = min(
+                    chance.choice([Decimal(0), Decimal("0.1"), Decimal("0.3"), Decimal(1)]), criterion.max_marks
+                )
+                overrides.set_marks(session, job_id, criterion.id, marks, "read again", "grace")
+            case "excuse one":
+                overrides.excuse_criterion(session, job_id, criterion.id, "the task was wrong", "grace")
+            case "excuse all":
+                for each in GRADE.criteria:
+                    overrides.excuse_criterion(session, job_id, each.id, "the task was wrong", "grace")
+
+
+@pytest.mark.parametrize("rule", CountedAttempt)
 @pytest.mark.parametrize("seed", quick_first(range(4), 2))
-def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int) -> None:
+def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int, rule: CountedAttempt) -> None:
     chance = random.Random(seed)
+    _set_rule(store, rule)
     with store.transaction() as session:
         ensure_course(session, "default", datetime.now(UTC))
         policies.set_policy(session, 1, "", PolicyLimits(attempts=chance.choice([2, None])))
     first = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
     for number in range(20):
-        match chance.choice(("submit", "end", "end", "quarantine")):
+        match chance.choice(("submit", "end", "end", "mark", "quarantine")):
             case "submit":
                 _submit(store, str(number), chance.choice([None, first.id]))
             case "end":
                 _end_next(store, chance.choice(["done", "done", "dead"]), f"worker-{number // 4}")
+            case "mark":
+                _change_some_marks(store, chance)
             case "quarantine":
                 self_tests.quarantine_worker(store, f"worker-{number // 4}", "it adds wrongly")
         with store.reading() as session:
             query = (
-                select(Job.id)
+                select(Job)
                 .join(SubmissionRow)
                 .where(
                     Job.standing == Standing.STANDS,
@@ -131,7 +183,10 @@ def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed:
                 )
                 .order_by(SubmissionRow.attempt.desc())
             )
-            expected = session.scalars(query.limit(1)).one_or_none()
+            graded = session.scalars(query).all()
+            if rule is CountedAttempt.BEST:
+                graded = sorted(graded, key=_share, reverse=True)
+            expected = graded[0].id if graded else None
         assert set(_readers(store, first.id).values()) == {expected}
 
 
@@ -185,3 +240,70 @@ def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excuse
     sent.clear()
     passback.send_marks(store, link, 1, "echo-responder")
     assert sent == []
+
+
+def test_the_best_attempt_counts_and_the_latest_of_several(store: Store) -> None:
+    first_criterion = GRADE.criteria[0].id
+    batch = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
+    _end_next(store)
+    first = batch.jobs[0].job_id
+    best, worst = _grade_with(store, "best", 1), _grade_with(store, "worst", 0, batch.id)
+    assert set(_readers(store, batch.id).values()) == {worst}
+    _set_rule(store, CountedAttempt.BEST)
+    assert set(_readers(store, batch.id).values()) == {best}
+    same = _grade_with(store, "as good", 1)
+    assert set(_readers(store, batch.id).values()) == {same}
+    # An excused criterion is removed from the maximum: 3 of 6 is a higher share than 4 of 10.
+    with store.transaction() as session:
+        overrides.excuse_criterion(session, best, first_criterion, "the task was wrong", "grace")
+    assert set(_readers(store, batch.id).values()) == {best}
+    # A completely excused attempt has no share.
+    with store.transaction() as session:
+        overrides.excuse_criterion(session, best, "second", "the task was wrong", "grace")
+    assert set(_readers(store, batch.id).values()) == {same}
+    with store.transaction() as session:
+        for job_id in (same, worst):
+            overrides.set_marks(session, job_id, first_criterion, Decimal(0), "copied", "grace")
+        overrides.set_marks(session, first, first_criterion, Decimal(1), "read again", "grace")
+    assert set(_readers(store, batch.id).values()) == {first}
+    exported = acting.export_file(store, batch.id, "moodle", published=False).data.decode()
+    with store.reading() as session:
+        (line,) = job_lines.load_job_lines(session, batch.id)
+    assert f"ada,{line.marks:f}," in exported
+
+
+def test_each_attempt_is_graded_and_counted_where_the_best_counts(store: Store) -> None:
+    """With the latest attempt, a newer submission replaces the queued one, which is then no attempt."""
+    for rule, cancelled, attempts in ((CountedAttempt.LATEST, 1, 0), (CountedAttempt.BEST, 1, 2)):
+        _set_rule(store, rule)
+        for number in range(2):
+            _submit(store, f"{rule} {number}")
+        with store.reading() as session:
+            reasons = session.scalars(select(Job.cancelled_for).where(Job.state == JobState.CANCELLED)).all()
+            assert reasons == [CancelReason.SUPERSEDED] * cancelled
+            enrolment_id = session.scalars(select(Enrolment.id)).one()
+            made = policies.count_attempts(session, enrolment_id, ["echo-responder"])["echo-responder"]
+            assert made == attempts + (rule is CountedAttempt.BEST)  # the last of the first two is queued, too
+
+
+@pytest.mark.parametrize("visibility", ["hidden", "after_published", "after_due_date"])
+def test_students_cannot_compare_hidden_marks_by_the_attempt_that_counts(store: Store, visibility: str) -> None:
+    _set_rule(store, CountedAttempt.BEST)
+    better, worse = _grade_with(store, "better", 1), _grade_with(store, "worse", 0)
+    assert {_readers(store, None)[name] for name in ("own list", "own page")} == {better}
+    with store.transaction() as session:
+        session.execute(
+            update(CriterionResultRow)
+            .where(CriterionResultRow.job_id == worse, CriterionResultRow.criterion == GRADE.criteria[0].id)
+            .values(visibility=visibility)
+        )
+    assert _readers(store, None) == {"own list": None, "own page": None, "course": better}
+    # The marks of one attempt are not enough for a comparison.
+    acting.publish_one(store, better, actor="grace", includes_unjudged=True)
+    assert _readers(store, None) == {"own list": None, "own page": None, "course": better}
+    if visibility == "after_due_date":
+        with store.transaction() as session:
+            policies.set_policy(session, 1, "", PolicyLimits(datetime(2020, 1, 1, tzinfo=UTC)))
+    else:
+        acting.publish_one(store, worse, actor="grace", includes_unjudged=True)
+    assert set(_readers(store, None).values()) == {better}

@@ -338,3 +338,23 @@ def test_the_place_in_the_queue_and_the_time_left_are_told(web: Web, ada: Member
     assert "This submission is being graded." in first.get(mine).text
     jobs.finish_job(web.store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
     _grade(web)
+
+
+def test_students_see_whether_the_latest_or_the_best_attempt_counts(web: Web, ada: Member) -> None:
+    browser, staff = web.browser(ada), web.browser(web.instructor())
+    _send(browser)
+    _grade(web)
+    latest = browser.get(f"{MINE}/open").text
+    assert "Your latest graded attempt" in latest
+    assert ">current grade<" in latest
+    try:
+        answer = submit(staff, "/courses/1/policy/counted-attempt", {"counted_attempt": "best"})
+        assert answer.headers["location"] == "/courses/1/assignments?done=counted-attempt"
+        assert '<option value="best" selected>' in staff.get(answer.headers["location"]).text
+        # The attempt has a hidden criterion, which must not become comparable.
+        best = browser.get(f"{MINE}/open").text
+        assert "Your best graded attempt" in best
+        assert "It is marked when you can see all marks" in best
+        assert ">current grade<" not in best
+    finally:
+        submit(staff, "/courses/1/policy/counted-attempt", {"counted_attempt": "latest"})
