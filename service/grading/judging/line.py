@@ -121,22 +121,22 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             recording.end,
         )
     crossings = _find_crossings(criterion, points, line_progress, recording.ticks.per_second)
-    lap_count, laps, spoilt_row = find_complete_laps(criterion, line_progress, crossings)
+    complete = find_complete_laps(criterion, line_progress, crossings)
     max_offset = float(np.abs(line_progress.offset[: _find_last_row(line_progress, crossings)]).max())
     driven_length = float(line_progress.progress.max() - line_progress.progress[0])
     measures = (
-        *([Measure("lap time", min(lap for lap, _ in laps), "s")] if laps else []),
-        Measure("laps", lap_count),
+        *([Measure("lap time", min(lap.seconds for lap in complete.laps), "s")] if complete.laps else []),
+        Measure("laps", complete.count),
         Measure("farthest off", max_offset, "mm"),
         Measure("part of a lap", driven_length / line_progress.length),
     )
     score = Fraction(min(max(driven_length / line_progress.length, 0.0) / criterion.laps, 1.0)).limit_denominator(1000)
-    if lap_count < criterion.laps:
-        if spoilt_row is not None:
+    if complete.count < criterion.laps:
+        if complete.spoilt_row is not None:
             return fail_with(
                 f"Expected {_describe_laps(criterion.laps)} within {criterion.within:g} mm of {criterion.line.name}, "
-                f"but the robot was {abs(line_progress.offset[spoilt_row]):.0f} mm off it.",
-                *find_place(recording, line_progress.first + spoilt_row),
+                f"but the robot was {abs(line_progress.offset[complete.spoilt_row]):.0f} mm off it.",
+                *find_place(recording, line_progress.first + complete.spoilt_row),
                 score=score,
                 measures=measures,
             )
@@ -149,17 +149,19 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
             score=score,
             measures=measures,
         )
-    best, row = min(laps)
-    if criterion.seconds is not None and not criterion.seconds[0] <= best <= criterion.seconds[1]:
+    best = min(complete.laps, key=lambda lap: (lap.seconds, lap.end_row))
+    if criterion.seconds is not None and not criterion.seconds[0] <= best.seconds <= criterion.seconds[1]:
         return fail_with(
             f"Expected a lap in {criterion.seconds[0]:g} to {criterion.seconds[1]:g} s, "
-            f"but the best took {best:.2f} s.",
-            *find_place(recording, row),
+            f"but the best took {best.seconds:.2f} s.",
+            *find_place(recording, best.end_row),
             score=score,
             measures=measures,
         )
     return pass_with(
-        f"The robot drove {_describe_laps(lap_count)}, the best in {best:.2f} s.", *find_place(recording, row), measures
+        f"The robot drove {_describe_laps(complete.count)}, the best in {best.seconds:.2f} s.",
+        *find_place(recording, best.end_row),
+        measures,
     )
 
 
@@ -191,17 +193,28 @@ def _find_crossings(criterion: Laps, points: Floats, line_progress: LineProgress
     return crossings
 
 
-def find_complete_laps(
-    criterion: Laps, line_progress: LineProgress, crossings: list[Crossing]
-) -> tuple[int, list[tuple[float, int]], int | None]:
+@dataclass(frozen=True, slots=True)
+class Lap:
+    """The duration of a complete lap in simulated time, and its last row."""
+
+    seconds: float
+    end_row: int
+
+
+@dataclass(frozen=True, slots=True)
+class CompleteLaps:
+    """The complete laps, overlapping ones included, and the largest number of laps that do not overlap."""
+
+    count: int
+    laps: tuple[Lap, ...]
+    spoilt_row: int | None  # where leaving the line spoilt a lap, if any
+
+
+def find_complete_laps(criterion: Laps, line_progress: LineProgress, crossings: list[Crossing]) -> CompleteLaps:
     """Return the complete laps.
 
     A lap begins at the last crossing from which it is complete, so it has the shortest time and the fewest ways to be
     spoilt.
-
-    Returns:
-        The largest number of laps that do not overlap; time and last row of each lap, overlapping ones included; and
-        the row where leaving the line spoilt a lap, if any.
     """
     count, laps, spoilt_row = 0, [], None
     first_free = 0
@@ -218,13 +231,13 @@ def find_complete_laps(
         rows = slice(lap_start.row - line_progress.first, crossing.row - line_progress.first + 1)
         offsets = np.abs(line_progress.offset[rows])
         if offsets.max() <= criterion.within:
-            laps.append((crossing.t - lap_start.t, crossing.row))
+            laps.append(Lap(crossing.t - lap_start.t, crossing.row))
             if start_number >= first_free:
                 count += 1
                 first_free = number
         elif spoilt_row is None and start_number >= first_free:
             spoilt_row = lap_start.row - line_progress.first + int(np.argmax(offsets))
-    return count, laps, spoilt_row
+    return CompleteLaps(count, tuple(laps), spoilt_row)
 
 
 def _find_last_row(line_progress: LineProgress, crossings: list[Crossing]) -> int:

@@ -387,9 +387,9 @@ def test_laps_are_those_that_an_exhaustive_search_finds(ways: list[tuple[int, bo
     )
     rule = criterion("laps", **CIRCUIT)
     assert isinstance(rule, Laps)
-    lap_count, laps, _ = find_complete_laps(rule, line_progress, crossings)
-    assert lap_count == most
-    assert min((seconds for seconds, _ in laps), default=0) == min((b - a for a, b in clean), default=0)
+    complete = find_complete_laps(rule, line_progress, crossings)
+    assert complete.count == most
+    assert min((lap.seconds for lap in complete.laps), default=0) == min((b - a for a, b in clean), default=0)
 
 
 def test_the_best_lap_is_timed_from_the_crossing_nearest_before_it() -> None:
