@@ -9,7 +9,7 @@ from pathlib import Path
 
 from service.operations.batches import find_batch_assignment
 from service.operations.context import Actor
-from service.web.context import WebContext, hold_slot
+from service.web.context import UPLOAD_IN_PROGRESS, WebContext, hold_slot
 from submissions.batch_folder import BatchContents, read_batch
 from submissions.student_identity import People
 
@@ -33,5 +33,5 @@ def read_upload(
     """
     batch_assignment = find_batch_assignment(context.service, actor, course_id, assignment)
     # One at a time, because an upload may need gigabytes of temporary disk space.
-    with hold_slot(context.unpacking):
+    with hold_slot(context.unpacking, UPLOAD_IN_PROGRESS):
         return read_batch(path, batch_assignment, people)

@@ -20,7 +20,7 @@ from service.web.rate_limits import RateLimits
 from sim.sentences import Sentence
 
 _SLOT_SECONDS = 30
-_UPLOAD_IN_PROGRESS = translatable("Another upload is in progress. Try again in a minute.")
+UPLOAD_IN_PROGRESS = translatable("Another upload is in progress. Try again in a minute.")
 EXPORT_IN_PROGRESS = translatable("Another download is being prepared. Try again in a minute.")
 #: Reading one submission can take hundreds of megabytes.
 _MAX_SUBMISSIONS_READ = 3
@@ -64,7 +64,7 @@ class WebContext:
 
 
 @contextmanager
-def hold_slot(slots: BoundedSemaphore, refusal: str = _UPLOAD_IN_PROGRESS) -> Iterator[None]:
+def hold_slot(slots: BoundedSemaphore, refusal: str) -> Iterator[None]:
     """Hold one of the slots within a ``with`` block. Raises HTTPException 503 with ``refusal`` if none becomes free."""
     if not slots.acquire(timeout=_SLOT_SECONDS):
         raise TranslatableHTTPException(503, Sentence(refusal), {"retry-after": "60"})

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from service.operations import submissions, test_runs
 from service.operations.context import Actor
 from service.operations.submissions import AcceptedSubmission, SubmissionRequest
-from service.web.context import WebContext, hold_slot
+from service.web.context import UPLOAD_IN_PROGRESS, WebContext, hold_slot
 from submissions.raw_files import UploadedFile
 
 
@@ -15,7 +15,7 @@ def submit(context: WebContext, actor: Actor, course_id: int, request: Submissio
     """Submit files. Raises HTTPException 429 above the rate limit or 503, and the errors of ``submissions.submit``."""
     submissions.load_submission_target(context.service, actor, course_id, request.assignment)
     context.limits.submissions.spend(str(actor.person_id))
-    with hold_slot(context.reading):
+    with hold_slot(context.reading, UPLOAD_IN_PROGRESS):
         return submissions.submit(context.service, actor, course_id, request)
 
 
@@ -25,5 +25,5 @@ def start_test_run(
     """Start a test run. Raises HTTPException 429 above the rate limit or 503, and the errors of ``test_runs.start``."""
     submissions.load_submission_target(context.service, actor, course_id, assignment)
     context.limits.test_runs.spend(str(actor.person_id))
-    with hold_slot(context.reading):
+    with hold_slot(context.reading, UPLOAD_IN_PROGRESS):
         return test_runs.start(context.service, actor, course_id, assignment, files)
