@@ -9,16 +9,14 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from sim.errors import UsageError
 from sim.floors import Floor
+from submissions.assignment.scenario import Scenario
 from submissions.strict_table import StrictTable
-
-if TYPE_CHECKING:
-    from submissions.assignment.definition import Scenario
 
 
 def as_tuple(value: object) -> object:
