@@ -15,14 +15,16 @@ from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
     Highlights,
+    add_axes,
     break_label,
     choose_arrow_colour,
+    create_figure,
     draw_actor,
     draw_arrow,
     draw_group_frame,
     draw_label,
 )
-from service.reports.plots.style import HEAD, WIDTH, add_axes, create_figure
+from service.reports.plots.style import HEAD, WIDTH
 from submissions.diagram import Diagram, DiagramArrow
 
 _MAX_HORIZONTAL_LEVELS = 4  # levels side by side; more go down the page

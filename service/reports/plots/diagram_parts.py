@@ -1,32 +1,42 @@
-"""Parts of block and sequence diagrams: actors, arrows, labels, and highlights of differences.
+"""Parts of block and sequence diagrams: the page, actors, arrows, labels, and highlights of differences.
 
 ``block_drawing.py`` and ``sequence_drawing.py`` decide the positions.
 """
 
 from __future__ import annotations
 
+import math
 import textwrap
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.patches import Ellipse, FancyArrowPatch, FancyBboxPatch, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path
+from matplotlib.text import Text
 
 from service.reports.display_text import to_one_line
+from service.reports.plots.plot import DPI
 from service.reports.plots.style import (
+    BOLD_FONT_FILE,
     FAINT,
     FAULT,
+    FONT_FILE,
     INK,
     LEFT,
+    MAX_PIXELS,
+    MIN_FONT_SIZE,
     RIGHT,
     RULE,
-    load_font,
+    TITLE_LEFT,
+    WIDTH,
+    lay_out_title,
     replace_missing_glyphs,
-    write_text,
 )
 from submissions.diagram import DiagramActor, DiagramArrow
 
@@ -70,6 +80,57 @@ class Highlights:
         """Write the meaning of the sign at the foot of the figure, if the sign is used."""
         if self.actors or self.arrows:
             write_text(figure, 0.08, 0.07, f"{self.sign} {self.words}", size=7.8, colour=self.colour, bold=True)
+
+
+def create_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
+    """Return a white figure of ``width`` x ``height`` inches with its title at the top left, in ``HEAD`` inches.
+
+    Very large figures get a lower resolution to save memory.
+    """
+    dpi = min(DPI, math.sqrt(MAX_PIXELS / (width * height)))
+    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    for line in lay_out_title(width, height, title, subtitle):
+        write_text(
+            figure, TITLE_LEFT, line.top, line.text, size=line.size, colour=line.colour, bold=line.bold, va="top"
+        )
+    return figure
+
+
+def write_text(
+    figure: Figure,
+    x: float,
+    y: float,
+    text: str,
+    *,
+    size: float = 8.5,
+    colour: str = INK,
+    bold: bool = False,
+    ha: str = "left",
+    va: str = "baseline",
+) -> Text:
+    """Write text at ``x``, ``y`` inches from the lower left corner of the figure."""
+    width, height = figure.get_size_inches()
+    return figure.text(
+        x / width, y / height, replace_missing_glyphs(text), color=colour, ha=ha, va=va, font=load_font(size,
+        bold=bold),
+        parse_math=False,
+    )  # fmt: skip
+
+
+def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Return axes without ticks and frame at a rectangle. Their coordinates are inches from its lower left corner."""
+    figure_width, figure_height = figure.get_size_inches()
+    axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
+    axes.set_axis_off()
+    axes.set_xlim(0, width)
+    axes.set_ylim(0, height)
+    return axes
+
+
+@lru_cache(maxsize=64)
+def load_font(size: float, *, bold: bool = False) -> FontProperties:
+    """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
+    return FontProperties(fname=str(BOLD_FONT_FILE if bold else FONT_FILE), size=max(size, MIN_FONT_SIZE))
 
 
 def break_label(text: str, inches: float, max_lines: int) -> tuple[str, ...]:

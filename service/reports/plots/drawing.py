@@ -5,17 +5,18 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 from matplotlib.markers import MarkerStyle
 from numpy.typing import NDArray
 
-from service.reports.display_text import to_one_line
-from service.reports.plots.style import CHARACTERS, FAINT, INK, MIN_FONT_SIZE, WIDTH
+from service.reports.plots.style import INK, MIN_FONT_SIZE, TITLE_LEFT, WIDTH, lay_out_title
+
+#: Default size of text, in points.
+TEXT_SIZE = 8.5
 
 Points = NDArray[np.float64]
 Horizontal = Literal["left", "center", "right"]
@@ -117,6 +118,17 @@ class Words:
     clip: Rectangle | None = None
 
 
+class TextStyle(TypedDict, total=False):
+    """Options of a text with the defaults of ``Words``."""
+
+    colour: str
+    bold: bool
+    horizontal: Horizontal
+    vertical: Vertical
+    rotation: Literal[0, 90]
+    background: str | None
+
+
 Item = Line | Segments | Area | Marks | Picture | Words
 
 
@@ -139,20 +151,12 @@ class Drawing:
         y: float,
         text: str,
         *,
-        size: float = 8.5,
-        colour: str = INK,
-        bold: bool = False,
-        horizontal: Horizontal = "left",
-        vertical: Vertical = "baseline",
-        rotation: Literal[0, 90] = 0,
-        background: str | None = None,
+        size: float = TEXT_SIZE,
         clip: Rectangle | None = None,
+        **style: Unpack[TextStyle],
     ) -> None:
         """Add text, in a size that a phone can show."""
-        size = max(size, MIN_FONT_SIZE)
-        self.items.append(
-            Words(text, x, y, size, colour, bold, horizontal, vertical, rotation, background, clip)
-        )  # fmt: skip
+        self.items.append(Words(text, x, y, max(size, MIN_FONT_SIZE), clip=clip, **style))
 
     def add_line(self, points: Iterable[Sequence[float]], stroke: Stroke) -> None:
         """Add a line through points."""
@@ -174,9 +178,8 @@ class Drawing:
 def create_drawing(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Drawing:
     """Return a page with its title and subtitle at the top left, in ``HEAD`` inches."""
     drawing = Drawing(width, height)
-    title_line = to_one_line(title, int(width * 10))
-    drawing.add_text(0.08, height - 0.08, title_line, size=10, bold=True, vertical="top")
-    lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * CHARACTERS), max_lines=2, placeholder=" …")
-    for number, line in enumerate(lines):
-        drawing.add_text(0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, vertical="top")
+    for line in lay_out_title(width, height, title, subtitle):
+        drawing.add_text(
+            TITLE_LEFT, line.top, line.text, size=line.size, colour=line.colour, bold=line.bold, vertical="top"
+        )
     return drawing

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, Unpack
 
 import numpy as np
 from matplotlib.markers import MarkerStyle
@@ -17,9 +17,9 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from service.reports.plots.drawing import (
+    TEXT_SIZE,
     Area,
     Drawing,
-    Horizontal,
     Line,
     Marks,
     Picture,
@@ -27,9 +27,9 @@ from service.reports.plots.drawing import (
     Rectangle,
     Segments,
     Stroke,
-    Vertical,
+    TextStyle,
 )
-from service.reports.plots.style import INK, MIN_FONT_SIZE, RULE
+from service.reports.plots.style import MIN_FONT_SIZE, RULE
 
 _TICK_LENGTH, _TICK_GAP = 3 / 72, 2 / 72  # inches
 _LINE_HEIGHT, _DIGIT_WIDTH = MIN_FONT_SIZE / 72 + 0.03, 0.6 * MIN_FONT_SIZE / 72  # inches
@@ -114,21 +114,14 @@ class Panel:
         y: float,
         text: str,
         *,
-        size: float = 8.5,
-        colour: str = INK,
-        bold: bool = False,
-        horizontal: Horizontal = "left",
-        vertical: Vertical = "baseline",
-        rotation: Literal[0, 90] = 0,
-        background: str | None = None,
+        size: float = TEXT_SIZE,
         clipped: bool = False,
+        **style: Unpack[TextStyle],
     ) -> None:
-        """Add text."""
+        """Add text like ``Drawing.add_text``, at a point of the panel."""
         ((left, bottom),) = self.to_inches([(x, y)])
-        self.drawing.add_text(
-            float(left), float(bottom), text, size=size, colour=colour, bold=bold, horizontal=horizontal,
-            vertical=vertical, rotation=rotation, background=background, clip=self.place if clipped else None,
-        )  # fmt: skip
+        clip = self.place if clipped else None
+        self.drawing.add_text(float(left), float(bottom), text, size=size, clip=clip, **style)
 
     def fill(self, colour: str) -> None:
         """Colour the panel."""

@@ -15,12 +15,15 @@ from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
     Highlights,
+    add_axes,
     break_label,
     choose_arrow_colour,
+    create_figure,
     draw_actor,
     draw_arrow,
     draw_group_frame,
     draw_label,
+    load_font,
 )
 from service.reports.plots.style import (
     FAINT,
@@ -28,9 +31,6 @@ from service.reports.plots.style import (
     HEAD,
     RULE,
     WIDTH,
-    add_axes,
-    create_figure,
-    load_font,
     replace_missing_glyphs,
 )
 from submissions.diagram import Diagram, DiagramArrow, Divider

@@ -5,25 +5,23 @@ It holds no state and never uses pyplot, so plots are the same in any process.
 
 from __future__ import annotations
 
-import math
 import textwrap
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import matplotlib
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties, get_font
-from matplotlib.text import Text
+from matplotlib.font_manager import get_font
 
 from service.reports.display_text import to_one_line
-from service.reports.plots.plot import DPI
 
 # A file called matplotlibrc in the current folder must not change plots.
 matplotlib.rcParams.update({name: value for name, value in matplotlib.rcParamsDefault.items() if "backend" not in name})
 
 #: Inches. A phone shows it 390 pixels wide, with the smallest type 11 pixels high.
 WIDTH = 3.9
+HEAD = 0.68  # height of the title and the subtitle
+TITLE_LEFT = 0.08
 MIN_FONT_SIZE = 8.0  # points
 CHARACTERS = 15.2  # characters of a subtitle in an inch
 MAX_PIXELS = 6_000_000
@@ -51,58 +49,25 @@ def lighten(value: int) -> int:
     return round(72 + value * (183 / 255))
 
 
-def create_figure(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Figure:
-    """Return a white figure of ``width`` x ``height`` inches with its title at the top left, in ``HEAD`` inches.
+@dataclass(frozen=True, slots=True)
+class TitleLine:
+    """A line of the title or the subtitle; ``top`` is the upper edge of its text in inches from the page's foot."""
 
-    Very large figures get a lower resolution to save memory.
-    """
-    dpi = min(DPI, math.sqrt(MAX_PIXELS / (width * height)))
-    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
-    write_text(figure, 0.08, height - 0.08, to_one_line(title, int(width * 10)), size=10, bold=True, va="top")
+    text: str
+    top: float
+    size: float  # points
+    colour: str
+    bold: bool
+
+
+def lay_out_title(width: float, height: float, title: str, subtitle: str) -> list[TitleLine]:
+    """Return the lines at the top left of a page of ``width`` x ``height`` inches, in ``HEAD`` inches."""
+    title_line = TitleLine(to_one_line(title, int(width * 10)), height - 0.08, 10, INK, bold=True)
     lines = textwrap.wrap(to_one_line(subtitle, 200), int(width * CHARACTERS), max_lines=2, placeholder=" …")
-    for number, line in enumerate(lines):
-        write_text(figure, 0.08, height - 0.29 - 0.135 * number, line, size=8, colour=FAINT, va="top")
-    return figure
-
-
-HEAD = 0.68
-
-
-def write_text(
-    figure: Figure,
-    x: float,
-    y: float,
-    text: str,
-    *,
-    size: float = 8.5,
-    colour: str = INK,
-    bold: bool = False,
-    ha: str = "left",
-    va: str = "baseline",
-) -> Text:
-    """Write text at ``x``, ``y`` inches from the lower left corner of the figure."""
-    width, height = figure.get_size_inches()
-    return figure.text(
-        x / width, y / height, replace_missing_glyphs(text), color=colour, ha=ha, va=va, font=load_font(size,
-        bold=bold),
-        parse_math=False,
-    )  # fmt: skip
-
-
-def add_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Return axes without ticks and frame at a rectangle. Their coordinates are inches from its lower left corner."""
-    figure_width, figure_height = figure.get_size_inches()
-    axes = figure.add_axes((left / figure_width, bottom / figure_height, width / figure_width, height / figure_height))
-    axes.set_axis_off()
-    axes.set_xlim(0, width)
-    axes.set_ylim(0, height)
-    return axes
-
-
-@lru_cache(maxsize=64)
-def load_font(size: float, *, bold: bool = False) -> FontProperties:
-    """Return the type bundled with matplotlib, independent of installed fonts, in a size readable on a phone."""
-    return FontProperties(fname=str(BOLD_FONT_FILE if bold else FONT_FILE), size=max(size, MIN_FONT_SIZE))
+    subtitle_lines = (
+        TitleLine(line, height - 0.29 - 0.135 * number, 8, FAINT, bold=False) for number, line in enumerate(lines)
+    )
+    return [title_line, *subtitle_lines]
 
 
 def replace_missing_glyphs(text: str) -> str:
