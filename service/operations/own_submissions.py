@@ -277,7 +277,7 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
         )
         .scalar_subquery()
     )
-    is_best, select_unpublished = current_grades.match_best_counts(), current_grades.select_unpublished_job
+    is_best, select_unpublished = policies.match_best_counts(), current_grades.select_unpublished_job
     return (
         select(
             SubmissionRow,

@@ -19,9 +19,9 @@ from service.store.batches.known_submissions import KnownSubmission, find_known_
 from service.store.codec import encode
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import FrozenAssignment, freeze_assignment, store_version
-from service.store.courses.policies import Ruling, apply_policy
+from service.store.courses.policies import Ruling, apply_policy, match_best_counts
 from service.store.engine import Store, now, retry_conflicts
-from service.store.grades import current_grades, result_cache
+from service.store.grades import result_cache
 from service.store.ids import generate_id
 from service.store.installation import load_secret
 from service.store.locks import lock_jobs
@@ -302,7 +302,7 @@ def _accept_item(session: Session, item: _IntakeItem, terms: _IntakeTerms) -> Ac
     job_id = generate_id()
     if not ruling.over:
         # Where the best attempt counts, each is graded.
-        replaced = select(SubmissionRow.id).where(*is_earlier, ~current_grades.match_best_counts())
+        replaced = select(SubmissionRow.id).where(*is_earlier, ~match_best_counts())
         jobs.supersede_jobs(session, replaced, job_id, current_time)
     row = SubmissionRow(
         enrolment_id=enrolment_id,

@@ -1,4 +1,4 @@
-"""Deadlines and attempts: the policy of a course, extensions of students, and their effects.
+"""Deadlines and attempts: the policy of a course, the attempt that counts, extensions of students, and their effects.
 
 A submission over a limit is stored and can be marked, but only staff see it. This module rejects no submissions.
 """
@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
-from sqlalchemy import ColumnElement, delete, func, or_, select
+from sqlalchemy import ColumnElement, delete, exists, func, or_, select
 from sqlalchemy.exc import NoResultFound
 from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
 from service.store.courses.local_days import add_days, count_days_after, find_local_zone
 from service.store.engine import now
-from service.store.grades import current_grades
 from service.store.states import CountedAttempt, JobState
 from service.store.tables.courses import Course, Extension, Policy
 from service.store.tables.people import Enrolment
@@ -206,6 +205,16 @@ def load_counted_attempt(session: Session, enrolment_id: int) -> CountedAttempt:
     return session.scalars(query.where(Enrolment.id == enrolment_id)).one()
 
 
+def match_best_counts() -> ColumnElement[bool]:
+    """Return the condition that the best attempt counts in the course of a ``SubmissionRow``."""
+    best_course = exists().where(
+        Enrolment.id == SubmissionRow.enrolment_id,
+        Course.id == Enrolment.course_id,
+        Course.counted_attempt == CountedAttempt.BEST,
+    )
+    return best_course.correlate(SubmissionRow)
+
+
 def extend_policy(
     session: Session, enrolment_id: int, assignment: str, due_at: datetime | None, more_attempts: int
 ) -> None:
@@ -293,7 +302,7 @@ def _load_attempt_times(
     counts = or_(
         Job.state == JobState.RUNNING,
         (Job.state == JobState.DONE) & Job.verdict.not_in(_UNCOUNTED_VERDICTS),
-        (Job.state == JobState.QUEUED) & current_grades.match_best_counts(),
+        (Job.state == JobState.QUEUED) & match_best_counts(),
     )
     submission_moment = func.coalesce(submission.submitted_at, submission.created_at)
     query = (

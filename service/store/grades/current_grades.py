@@ -10,13 +10,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Protocol
 
-from sqlalchemy import ColumnElement, Float, Select, Subquery, and_, case, cast, exists, func, or_, select, tuple_
+from sqlalchemy import ColumnElement, Float, Select, Subquery, and_, case, cast, func, or_, select, tuple_
 from sqlalchemy.orm import aliased
 
-from service.store.states import CountedAttempt, JobState, Standing
-from service.store.tables.courses import Course
+from service.store.courses import policies
+from service.store.states import JobState, Standing
 from service.store.tables.grades import CriterionResultRow
-from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 
 #: Condition on a job: it is graded, and its worker is not known to grade incorrectly.
@@ -55,16 +54,6 @@ def is_trusted(job: JobStatus) -> bool:
 def is_for_students(attempt: AttemptStatus) -> bool:
     """Return whether ``IS_FOR_STUDENTS`` applies."""
     return is_trusted(attempt) and attempt.staff_only is None
-
-
-def match_best_counts() -> ColumnElement[bool]:
-    """Return the condition that the best attempt counts in the course of a ``SubmissionRow``."""
-    best_course = exists().where(
-        Enrolment.id == SubmissionRow.enrolment_id,
-        Course.id == Enrolment.course_id,
-        Course.counted_attempt == CountedAttempt.BEST,
-    )
-    return best_course.correlate(SubmissionRow)
 
 
 def select_unpublished_job(*visibilities: str) -> ColumnElement[str | None]:
@@ -155,6 +144,6 @@ def _compute_best_share() -> ColumnElement[int]:
 
     It is -1 for attempts that cannot count and for completely excused ones, and everywhere else.
     """
-    can_have_share = and_(*CAN_COUNT, Job.max_marks > 0, match_best_counts())
+    can_have_share = and_(*CAN_COUNT, Job.max_marks > 0, policies.match_best_counts())
     share = cast(Job.marks, Float) / cast(Job.max_marks, Float)
     return case((can_have_share, func.round(share * _SHARE_UNITS)), else_=-1)
