@@ -8,32 +8,25 @@ from __future__ import annotations
 
 import io
 import math
-from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageColor, ImageDraw, ImageFont
+from PIL import Image, ImageColor, ImageDraw
 
 from service.grading.grade import TrialResult
-from service.reports.display_text import to_one_line
+from service.reports.film_captions import Caption, draw_caption_strip
 from service.reports.plots.style import (
     FAINT,
     FAULT,
-    FONT_FILE,
     INK,
     LEFT,
     PEN,
     RIGHT,
     RULE,
     SECOND_ROBOT,
-    replace_missing_glyphs,
 )
-from service.reports.replay.sources import Sources
-from service.reports.replay.trial import trial_to_json
 from service.reports.robots import iterate_robots
 from sim.recording import Pose, Recording
 from sim.recording_values import count_ticks_until, get_pose_after, get_recorded_robot, rebuild_floor
@@ -54,8 +47,6 @@ _COLOURS = (INK, LEFT, RIGHT, PEN, FAULT, SECOND_ROBOT, FAINT, RULE, _OFF_THE_FL
 _IMAGE_COLOURS, _TOO_NEAR = 150, 8
 _OVERSAMPLING = 3  # drawings are enlarged by this factor first, for smooth edges
 _ULTRASONIC_LIMIT = 2550  # mm
-#: The shortest and longest display of a text, in frames.
-_MIN_CAPTION_FRAMES, _MAX_CAPTION_FRAMES = 10, 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +87,7 @@ def _draw_frames(
 ) -> Iterator[Image.Image]:
     """Yield a frame for each moment. Trails of the robots are drawn on ``ground``."""
     recording = trial.recording
-    caption = _Caption(trial)
+    caption = Caption(trial)
     robot_recordings = [own for _, own in iterate_robots(recording)]
     drawn_tick, marked_time = 0, -math.inf
     for frame_number, t in enumerate(moments):
@@ -110,7 +101,7 @@ def _draw_frames(
             _draw_robot(scene, robot_recording, viewport, tick, SECOND_ROBOT if robot_index else INK)
         frame = Image.new("RGB", (_WIDTH, viewport.height + _STRIP), _PAPER)
         frame.paste(scene)
-        _draw_caption_strip(frame, viewport.height, t, recording.end_t, speed, caption.at(t, frame_number))
+        draw_caption_strip(frame, viewport.height, t, recording.end_t, speed, caption.at(t, frame_number))
         yield frame
 
 
@@ -348,65 +339,6 @@ class _Layer:
 
     def _enlarge(self, point: Point) -> Point:
         return (point[0] - self._left) * _OVERSAMPLING, (point[1] - self._top) * _OVERSAMPLING
-
-
-class _Caption:
-    """The text below the floor: the latest one, shown long enough to read."""
-
-    def __init__(self, trial: TrialResult) -> None:
-        trial_data = trial_to_json(trial, Sources())
-        texts = [*trial_data["events"], *trial_data["messages"]]
-        self._texts = sorted(texts, key=lambda text: float(text["t"]))
-        self._times = [float(text["t"]) for text in self._texts]
-        self._count, self._start_frame = 0, 0
-
-    def at(self, t: float, frame: int) -> tuple[str, str]:
-        """Return the text and its colour. Frames must be requested in order."""
-        count = bisect_right(self._times, t + 1e-6)
-        if count > self._count and (not self._count or frame - self._start_frame >= _MIN_CAPTION_FRAMES):
-            self._count, self._start_frame = count, frame
-        if not self._count or frame - self._start_frame > _MAX_CAPTION_FRAMES:
-            return "", INK
-        return _format_caption(self._texts[self._count - 1])
-
-
-def _format_caption(text: Mapping[str, Any]) -> tuple[str, str]:
-    if "kind" in text:
-        return f"{text['who']} {text['kind']}: {text['text']}", FAULT if text["kind"] in ("fault", "touched") else INK
-    loss_text = f"{text['befell']}: " if "befell" in text else ""
-    return f"{text['from']} → {text['to']}: {loss_text}{text['text']}", FAULT if text["arrived"] is None else LEFT
-
-
-def _draw_caption_strip(
-    frame: Image.Image, top: int, t: float, end: float, speed: int, caption: tuple[str, str]
-) -> None:
-    """Draw the progress as a bar and as a time, and the latest text."""
-    draw = ImageDraw.Draw(frame)
-    draw.rectangle((0, top, _WIDTH, top + 3), fill=RULE)
-    draw.rectangle((0, top, round(_WIDTH * t / end) if end else _WIDTH, top + 3), fill=LEFT)
-    clock = f"{t:.1f} of {end:.1f} s"
-    draw.text((8, top + 8), clock, fill=INK, font=_load_font())
-    draw.text((_WIDTH - 8, top + 8), f"{speed}×", fill=FAINT, font=_load_font(), anchor="ra")
-    text, colour = caption
-    draw.text(
-        (8, top + 28),
-        _shorten_text(replace_missing_glyphs(to_one_line(text, 200)), _WIDTH - 16),
-        fill=colour,
-        font=_load_font(),
-    )
-
-
-def _shorten_text(text: str, width: int) -> str:
-    if _load_font().getlength(text) <= width:
-        return text
-    while text and _load_font().getlength(f"{text}…") > width:
-        text = text[:-1]
-    return f"{text}…"
-
-
-@lru_cache(maxsize=1)
-def _load_font() -> ImageFont.FreeTypeFont:
-    return ImageFont.truetype(str(FONT_FILE), 14, layout_engine=ImageFont.Layout.BASIC)
 
 
 def _build_palette(frames: Iterator[Image.Image]) -> Image.Image:
