@@ -1,6 +1,6 @@
 """Enumerations of the store: roles, queues, and the states of jobs, plots, batches and grades.
 
-``jobs.py`` defines the transitions between job states.
+``job_transitions.py`` defines the transitions between job states.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Job states and all their transitions. No other module writes a job's state, lease or due time.
+"""Operations on jobs. Only they apply the transitions of ``job_transitions.py``.
+
+No other module writes a job's state, lease or due time.
 
 A worker owns a job through the token of its lease; a change with an outdated token is rejected. ``scheduling.py``
 chooses the next job, ``lease_reaper.py`` finds lost ones, and ``plots.py`` handles plots.
@@ -14,7 +16,7 @@ from datetime import datetime, timedelta
 from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import ColumnElement, CursorResult, Select, Table, bindparam, select, update
+from sqlalchemy import ColumnElement, Select, Table, bindparam, select, update
 from sqlalchemy.orm import Session
 from sqlalchemy.sql.dml import ReturningUpdate
 
@@ -26,6 +28,23 @@ from service.store.grades.grade_sentences import encode_sentences
 from service.store.installation import load_secret
 from service.store.locks import match_and_lock_jobs
 from service.store.queue import workers
+from service.store.queue.job_transitions import (
+    ASK_FOR,
+    CANCEL,
+    CLAIM,
+    COPY,
+    ENQUEUE,
+    FINISH,
+    GIVE_BACK,
+    GIVE_UP,
+    HEARTBEAT,
+    PUT_ASIDE,
+    RETRY,
+    SUPERSEDE,
+    TRY_AGAIN,
+    Transition,
+    apply_transition,
+)
 from service.store.queue.scheduling import check_worker, find_next_job
 from service.store.states import CancelReason, JobState, PlotState
 from service.store.tables.submissions import Job
@@ -38,35 +57,6 @@ if TYPE_CHECKING:
 _MAX_BACKOFF = timedelta(hours=1)
 #: Smaller clock corrections are normal and ignored.
 _TOLERANCE = timedelta(seconds=2)
-
-
-@dataclass(frozen=True, slots=True)
-class Transition:
-    """A transition of a job: the states before, the state after, and the actor. No state before means a new job."""
-
-    name: str
-    before: tuple[JobState, ...]
-    after: JobState
-    by: str
-
-
-ENQUEUE = Transition("enqueue", (), JobState.QUEUED, "intake, a regrade, a quarantine")
-COPY = Transition("copy", (JobState.QUEUED,), JobState.DONE, "intake")
-SUPERSEDE = Transition("supersede", (JobState.QUEUED,), JobState.CANCELLED, "intake")
-CLAIM = Transition("claim", (JobState.QUEUED,), JobState.RUNNING, "a worker")
-HEARTBEAT = Transition("heartbeat", (JobState.RUNNING,), JobState.RUNNING, "the worker that holds it")
-FINISH = Transition("finish", (JobState.RUNNING,), JobState.DONE, "the worker that holds it")
-TRY_AGAIN = Transition("try again", (JobState.RUNNING,), JobState.QUEUED, "the worker that holds it, the lease reaper")
-GIVE_UP = Transition("give up", (JobState.RUNNING,), JobState.DEAD, "the worker that holds it, the lease reaper")
-GIVE_BACK = Transition("give back", (JobState.RUNNING,), JobState.QUEUED, "a worker's end, a quarantine")
-CANCEL = Transition("cancel", (JobState.QUEUED, JobState.RUNNING), JobState.CANCELLED, "staff")
-RETRY = Transition("retry", (JobState.DEAD,), JobState.QUEUED, "staff")
-PUT_ASIDE = Transition("put aside", (JobState.QUEUED,), JobState.CANCELLED, "intake")
-ASK_FOR = Transition("ask for", (JobState.CANCELLED,), JobState.QUEUED, "staff")
-TRANSITIONS = (
-    ENQUEUE, COPY, SUPERSEDE, CLAIM, HEARTBEAT, FINISH, TRY_AGAIN, GIVE_UP, GIVE_BACK, CANCEL, RETRY,
-    PUT_ASIDE, ASK_FOR,
-)  # fmt: skip
 
 
 class LeaseLost(Cancelled):
@@ -107,7 +97,7 @@ def enqueue(session: Session, job: Job, current_time: datetime) -> str:
 def copy_grade(session: Session, job_id: str, source_id: str, current_time: datetime) -> None:
     """Give a queued job the grade of an identical one. Raises HostError if it is not queued."""
     values = result_cache.build_copied_values(session, source_id, job_id, current_time)
-    if not _apply_transition(session, COPY, (Job.id == job_id,), current_time, values):
+    if not apply_transition(session, COPY, (Job.id == job_id,), current_time, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
     overrides.recount_marks(session, job_id)
@@ -122,14 +112,14 @@ def supersede_jobs(session: Session, submissions: Select[int], new_job_id: str, 
         "cancelled_for": CancelReason.SUPERSEDED,
         "superseded_by": new_job_id,
     }
-    if _apply_transition(session, SUPERSEDE, conditions, current_time, reason):
+    if apply_transition(session, SUPERSEDE, conditions, current_time, reason):
         outbox.emit_superseded_batches(session, submissions, current_time)
 
 
 def put_aside_job(session: Session, job_id: str, current_time: datetime) -> None:
     """Cancel a queued job that is over a limit; it is graded only if staff ask for it."""
     sentence = "over a limit: it is graded when staff ask for it"
-    _apply_transition(
+    apply_transition(
         session,
         PUT_ASIDE,
         (Job.id == job_id,),
@@ -141,7 +131,7 @@ def put_aside_job(session: Session, job_id: str, current_time: datetime) -> None
 def queue_over_limit_job(session: Session, job_id: str, current_time: datetime) -> bool:
     """Queue a job that was over a limit. Return whether it was."""
     conditions = (Job.id == job_id, Job.cancelled_for == CancelReason.OVER_LIMIT)
-    return _apply_transition(session, ASK_FOR, conditions, current_time, {"error": None, "cancelled_for": None}) > 0
+    return apply_transition(session, ASK_FOR, conditions, current_time, {"error": None, "cancelled_for": None}) > 0
 
 
 @retry_conflicts
@@ -324,12 +314,12 @@ def release_worker(store: Store, worker: str) -> int:
 
 def requeue_worker_jobs(session: Session, worker: str, current_time: datetime) -> int:
     """Requeue all jobs of a worker without counting the attempt. Return their number."""
-    return _apply_transition(session, GIVE_BACK, (Job.worker == worker,), current_time, {"attempt": Job.attempt - 1})
+    return apply_transition(session, GIVE_BACK, (Job.worker == worker,), current_time, {"attempt": Job.attempt - 1})
 
 
 def cancel_jobs(session: Session, batch_id: str, reason: str, current_time: datetime) -> int:
     """Cancel all unfinished jobs of a batch; a running job stops at its next heartbeat."""
-    cancelled_count = _apply_transition(session, CANCEL, (Job.batch_id == batch_id,), current_time, {"error": reason})
+    cancelled_count = apply_transition(session, CANCEL, (Job.batch_id == batch_id,), current_time, {"error": reason})
     if cancelled_count:
         outbox.emit_batch_finished(session, batch_id)
     return cancelled_count
@@ -337,7 +327,7 @@ def cancel_jobs(session: Session, batch_id: str, reason: str, current_time: date
 
 def retry_jobs(session: Session, conditions: tuple[ColumnElement[bool], ...], current_time: datetime) -> int:
     """Requeue the dead ones among these jobs, with all their attempts. Return their number."""
-    return _apply_transition(session, RETRY, conditions, current_time, {"attempt": 0, "error": None})
+    return apply_transition(session, RETRY, conditions, current_time, {"attempt": 0, "error": None})
 
 
 def correct_clock(session: Session, current_time: datetime, longest_wait: Callable[[int], timedelta]) -> None:
@@ -370,40 +360,11 @@ def correct_clock(session: Session, current_time: datetime, longest_wait: Callab
     plots.correct_due_times(session, current_time, latest_time)
 
 
-def _build_state_columns(state: JobState, current_time: datetime) -> dict[str, Any]:
-    """Return the columns that every transition into a state sets."""
-    match state:
-        case JobState.QUEUED:
-            queue_columns = {"progress": 0.0, "due_at": current_time, "notified_at": None, "finished_at": None}
-            return {"lease": None, "lease_until": None} | queue_columns
-        case JobState.RUNNING:
-            return {}
-        case JobState.DONE:
-            return {"lease": None, "lease_until": None, "finished_at": current_time, "progress": 1.0, "error": None}
-        case JobState.DEAD | JobState.CANCELLED:
-            return {"lease": None, "lease_until": None, "finished_at": current_time}
-
-
-def _apply_transition(
-    session: Session,
-    transition: Transition,
-    conditions: tuple[ColumnElement[bool], ...],
-    current_time: datetime,
-    values: dict[str, Any],
-) -> int:
-    """Apply the transition to those of these jobs that are in a valid state before it. Return their number."""
-    columns = {"state": transition.after} | _build_state_columns(transition.after, current_time) | values
-    conditions = (*conditions, Job.state.in_(transition.before))
-    statement = update(Job).where(match_and_lock_jobs(*conditions), *conditions).values(**columns)
-    options = {"synchronize_session": False}
-    return cast("CursorResult[Any]", session.execute(statement, execution_options=options)).rowcount
-
-
 def _apply_owned_transition(
     session: Session, transition: Transition, claim: Claim, current_time: datetime, values: dict[str, Any]
 ) -> None:
     """Apply the transition to an owned job. Raises LeaseLost if the worker no longer owns it."""
-    if not _apply_transition(
+    if not apply_transition(
         session, transition, (Job.id == claim.job_id, Job.lease == claim.lease), current_time, values
     ):
         state = session.scalar(select(Job.state).where(Job.id == claim.job_id))

@@ -20,13 +20,30 @@ from builders import grading_request, prepared
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, now
 from service.store.queue import jobs
-from service.store.queue.jobs import TRANSITIONS, Claim, LeaseLost, RetryPolicy, Transition
+from service.store.queue.job_transitions import (
+    ASK_FOR,
+    CANCEL,
+    CLAIM,
+    COPY,
+    ENQUEUE,
+    FINISH,
+    GIVE_BACK,
+    GIVE_UP,
+    HEARTBEAT,
+    PUT_ASIDE,
+    RETRY,
+    SUPERSEDE,
+    TRANSITIONS,
+    TRY_AGAIN,
+    Transition,
+)
+from service.store.queue.jobs import Claim, LeaseLost, RetryPolicy
 from service.store.states import CancelReason, JobState
 from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError
 
 WORKER = "worker"
-RETRY = RetryPolicy(0.0)
+POLICY = RetryPolicy(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +73,7 @@ def _finish(store: Store, claim: Claim) -> None:
 
 def _fail(store: Store, claim: Claim, *, enough: bool) -> None:
     tried = Claim(claim.job_id, claim.lease, 2 if enough else 1, 2, claim.at)
-    jobs.fail_job(store, tried, "it broke", RETRY)
+    jobs.fail_job(store, tried, "it broke", POLICY)
 
 
 def _in_session(change: Callable[..., object]) -> Callable[[Store, Subject], object]:
@@ -79,22 +96,20 @@ def _ask_for(session: Session, subject: Subject, at: datetime) -> None:
 
 #: One action for each transition, by a caller who may do it.
 MOVES: dict[Transition, Callable[[Store, Subject], object]] = {
-    jobs.COPY: _in_session(
-        lambda session, subject, at: jobs.copy_grade(session, subject.job_id, subject.source_id, at)
-    ),
-    jobs.SUPERSEDE: _in_session(
+    COPY: _in_session(lambda session, subject, at: jobs.copy_grade(session, subject.job_id, subject.source_id, at)),
+    SUPERSEDE: _in_session(
         lambda session, subject, at: jobs.supersede_jobs(session, _submissions(subject), "another", at)
     ),
-    jobs.CLAIM: lambda store, subject: jobs.claim_job(store, WORKER, 60),
-    jobs.HEARTBEAT: lambda store, subject: jobs.renew_lease(store, subject.claim, 60, 0.5),
-    jobs.FINISH: lambda store, subject: _finish(store, subject.claim),
-    jobs.TRY_AGAIN: lambda store, subject: _fail(store, subject.claim, enough=False),
-    jobs.GIVE_UP: lambda store, subject: _fail(store, subject.claim, enough=True),
-    jobs.GIVE_BACK: lambda store, subject: jobs.release_worker(store, WORKER),
-    jobs.CANCEL: _in_session(lambda session, subject, at: jobs.cancel_jobs(session, subject.batch_id, "enough", at)),
-    jobs.RETRY: _in_session(lambda session, subject, at: jobs.retry_jobs(session, (Job.id == subject.job_id,), at)),
-    jobs.PUT_ASIDE: _in_session(lambda session, subject, at: jobs.put_aside_job(session, subject.job_id, at)),
-    jobs.ASK_FOR: _in_session(_ask_for),
+    CLAIM: lambda store, subject: jobs.claim_job(store, WORKER, 60),
+    HEARTBEAT: lambda store, subject: jobs.renew_lease(store, subject.claim, 60, 0.5),
+    FINISH: lambda store, subject: _finish(store, subject.claim),
+    TRY_AGAIN: lambda store, subject: _fail(store, subject.claim, enough=False),
+    GIVE_UP: lambda store, subject: _fail(store, subject.claim, enough=True),
+    GIVE_BACK: lambda store, subject: jobs.release_worker(store, WORKER),
+    CANCEL: _in_session(lambda session, subject, at: jobs.cancel_jobs(session, subject.batch_id, "enough", at)),
+    RETRY: _in_session(lambda session, subject, at: jobs.retry_jobs(session, (Job.id == subject.job_id,), at)),
+    PUT_ASIDE: _in_session(lambda session, subject, at: jobs.put_aside_job(session, subject.job_id, at)),
+    ASK_FOR: _in_session(_ask_for),
 }
 
 
@@ -122,7 +137,7 @@ def _job(store: Store, job_id: str) -> Job:
 
 @pytest.mark.parametrize("state", JobState)
 def test_a_transition_is_made_where_it_begins_and_nowhere_else(store: Store, state: JobState) -> None:
-    assert set(MOVES) == set(TRANSITIONS) - {jobs.ENQUEUE}
+    assert set(MOVES) == set(TRANSITIONS) - {ENQUEUE}
     source_id, _ = _accept(store, "source")
     _finish(store, _claimed(store))
     for number, (transition, move) in enumerate(MOVES.items()):
@@ -218,17 +233,17 @@ def test_a_write_of_a_state_would_be_found(written: str) -> None:
     assert list(_job_writes(ast.parse(written)))
 
 
-#: The one module that writes them, and the module of test runs, which are not jobs and have their own states.
-_WITH_STATES = ("store/queue/jobs.py", "store/queue/test_runs.py")
+#: The modules that write them, and the module of test runs, which are not jobs and have their own states.
+_WRITERS, _TEST_RUNS = ("store/queue/jobs.py", "store/queue/job_transitions.py"), "store/queue/test_runs.py"
 
 
 def test_nothing_else_writes_the_state_of_a_job() -> None:
     folder = Path(service.__file__ or "").parent
-    assert "Job" not in _imported((folder / _WITH_STATES[1]).read_text(encoding="utf-8"))
+    assert "Job" not in _imported((folder / _TEST_RUNS).read_text(encoding="utf-8"))
     writers = {
         f"{path.relative_to(folder)}:{line}"
         for path in sorted(folder.rglob("*.py"))
-        if path.relative_to(folder).as_posix() not in _WITH_STATES and "versions" not in path.parts
+        if path.relative_to(folder).as_posix() not in (*_WRITERS, _TEST_RUNS) and "versions" not in path.parts
         for line in _job_writes(ast.parse(path.read_text(encoding="utf-8")))
     }
     assert writers == set()
