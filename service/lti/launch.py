@@ -15,7 +15,8 @@ from jwt import PyJWK, PyJWKSet
 from jwt.exceptions import InvalidAlgorithmError, PyJWTError
 
 from service.lti.platform_requests import fetch_json
-from service.store.people.lti import PendingLaunch, Platform
+from service.store.people.lti import Platform
+from service.store.people.lti_launches import PendingLaunch
 from service.store.states import Role
 from sim.errors import UsageError
 from submissions.student_identity import Student

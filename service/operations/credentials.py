@@ -11,7 +11,7 @@ from service.operations.context import Actor, Service
 from service.operations.errors import Conflict, Forbidden, Invalid, NotFound
 from service.operations.scopes import list_offered_scopes
 from service.store import audit
-from service.store.people import credentials
+from service.store.people import credentials, revocation
 from service.store.people.credentials import MAX_TOKENS, CredentialLine
 from service.store.people.reach import Reach
 from service.store.states import Role
@@ -67,7 +67,7 @@ def end_credential(service: Service, actor: Actor, credential_id: str) -> None:
     """End one of the actor's sessions or tokens. Raises NotFound if they do not have it."""
     person_id = _require_person_id(actor)
     with service.store.transaction() as session:
-        if not credentials.revoke_credential(session, credential_id, person_id, actor.reach):
+        if not revocation.revoke_credential(session, credential_id, person_id, actor.reach):
             raise NotFound("you have no session or token with this id")
         audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=1)
 
@@ -76,7 +76,7 @@ def end_other_credentials(service: Service, actor: Actor) -> int:
     """End all credentials of the actor except the one in use. Returns the number ended."""
     person_id = _require_person_id(actor)
     with service.store.transaction() as session:
-        ended_count = credentials.revoke_all(session, person_id, kept_id=actor.credential_id, reach=actor.reach)
+        ended_count = revocation.revoke_all(session, person_id, kept_id=actor.credential_id, reach=actor.reach)
         audit.record_action(session, actor.name, "sign out", "person", str(person_id), ended=ended_count)
     return ended_count
 

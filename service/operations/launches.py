@@ -10,7 +10,7 @@ from service.lti.keys import build_public_key_set, ensure_signing_key
 from service.operations.context import Service
 from service.operations.errors import Invalid
 from service.store import audit
-from service.store.people import credentials, lti
+from service.store.people import credentials, lti, lti_launches
 from service.store.people.credentials import SESSION_LIFETIME, NewSession
 from service.store.people.lti import LaunchResult
 from service.store.people.reach import Reach
@@ -70,7 +70,7 @@ def begin(service: Service, request: LaunchRequest) -> StartedLaunch:
             "the platform %(issuer)s is not registered with this client ID", issuer=repr(request.issuer[:100])
         )
     with service.store.transaction() as session:
-        state, nonce = lti.begin_launch(session, platform, request.target)
+        state, nonce = lti_launches.begin_launch(session, platform, request.target)
     return_url = f"{request.address}/lti/launch"
     authorization_url = launch.build_authorization_url(
         platform, return_url, request.login_hint, request.message_hint, state, nonce
@@ -87,11 +87,11 @@ def complete(service: Service, state: str, id_token: str) -> CompletedLaunch:
         PlatformError: The platform's keys cannot be fetched.
     """
     with service.store.reading() as session:
-        is_started = lti.has_launch(session, state)
+        is_started = lti_launches.has_launch(session, state)
     pending_launch = None
     if is_started:  # Anybody can send a state: take the write lock only for a known one.
         with service.store.transaction() as session:
-            pending_launch = lti.take_launch(session, state)
+            pending_launch = lti_launches.take_launch(session, state)
     if pending_launch is None:
         raise Invalid("this launch has expired or was already used; open the link in the course again")
     claims = launch.read_launch(pending_launch, id_token)

@@ -15,7 +15,7 @@ from service.operations.lookup import check_no_names_hidden, check_operator, req
 from service.store import audit
 from service.store.engine import now, retry_conflicts
 from service.store.locks import lock_course, lock_persons
-from service.store.people import credentials, membership
+from service.store.people import credentials, membership, revocation
 from service.store.people.credentials import CredentialLine
 from service.store.people.membership import Member as Member
 from service.store.people.reach import Reach
@@ -88,7 +88,7 @@ def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool
     check_operator(actor)
     with service.store.transaction() as session:
         row = _require_enrolment(session, enrolment_id)
-        ended_count = credentials.revoke_all(session, row.person_id)
+        ended_count = revocation.revoke_all(session, row.person_id)
         if release:
             session.get_one(Person, row.person_id).signed_in_at = None
         audit.record_action(

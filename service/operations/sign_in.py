@@ -8,7 +8,7 @@ from __future__ import annotations
 from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
-from service.store.people import credentials
+from service.store.people import credentials, revocation
 from service.store.people.credentials import Identity as Identity
 from service.store.people.credentials import LinkOwner
 from service.store.people.credentials import NewSession as NewSession
@@ -56,4 +56,4 @@ def sign_out(service: Service, actor: Actor) -> None:
 
 def _end_session(session: Session, actor: Actor) -> None:
     assert actor.person_id is not None
-    credentials.revoke_credential(session, actor.credential_id, actor.person_id)
+    revocation.revoke_credential(session, actor.credential_id, actor.person_id)

@@ -1,6 +1,7 @@
 """Credentials: single-use sign-in links, browser sessions and API tokens, with the reach of each.
 
-Only hashes of secrets are stored. The web service decides what each role permits.
+Only hashes of secrets are stored. ``revocation.py`` revokes credentials, and the web service decides what each role
+permits.
 """
 
 from __future__ import annotations
@@ -10,11 +11,10 @@ import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from functools import cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, delete, exists, func, or_, select, true, update
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy import and_, delete, func, select, true, update
+from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
@@ -27,6 +27,7 @@ from service.store.people.reach import (
     match_reached_credentials,
     match_reached_enrolments,
 )
+from service.store.people.revocation import match_valid, revoke_matching
 from service.store.states import CredentialKind, Role
 from service.store.tables.people import Credential, Enrolment, Person
 
@@ -177,7 +178,7 @@ def count_tokens(session: Session, person_id: int) -> int:
     """Return the number of a person's valid tokens and lock the person until the end of the transaction."""
     session.get_one(Person, person_id, with_for_update={"key_share": True})
     query = select(func.count()).where(Credential.person_id == person_id, Credential.kind == CredentialKind.TOKEN)
-    return session.scalar(query.where(*_match_valid(now(session)))) or 0
+    return session.scalar(query.where(*match_valid(now(session)))) or 0
 
 
 def replace_links(
@@ -288,45 +289,13 @@ def record_use(session: Session, credential_id: str) -> None:
         row.used_at = current_time
 
 
-def revoke_credential(session: Session, credential_id: str, person_id: int, reach: Reach = UNLIMITED_REACH) -> bool:
-    """Revoke a credential. Returns False if this person does not have it within ``reach``."""
-    conditions = (Credential.id == credential_id, Credential.person_id == person_id, Credential.revoked_at.is_(None))
-    return _revoke(session, *conditions, *match_reached_credentials(reach)) == 1
-
-
-def revoke_all(session: Session, person_id: int, *, kept_id: str = "", reach: Reach = UNLIMITED_REACH) -> int:
-    """Revoke all links, sessions and tokens of a person within ``reach`` except one. Returns the number revoked."""
-    conditions = (Credential.person_id == person_id, Credential.id != kept_id, *_match_valid(now(session)))
-    return _revoke(session, *conditions, *match_reached_credentials(reach))
-
-
-def revoke_for_course(session: Session, person_id: int, course_id: int) -> int:
-    """Revoke all credentials of a person that reach a course. Returns the number revoked."""
-    has_reach = or_(Credential.course_id.is_(None), Credential.course_id == course_id)
-    return _revoke(session, Credential.person_id == person_id, has_reach, *_match_valid(now(session)))
-
-
-def _revoke(session: Session, *conditions: ColumnElement[bool]) -> int:
-    """Revoke credentials and everything made with them. Returns the number without what was made with them."""
-    current_time = now(session)
-    revoked_rows = session.execute(update(Credential).where(*conditions).values(revoked_at=current_time))
-    revoke_derived = (
-        update(Credential)
-        .where(Credential.revoked_at.is_(None), _match_revoked_parent())
-        .values(revoked_at=current_time)
-    )
-    while session.execute(revoke_derived, execution_options={"synchronize_session": False}).rowcount:  # type: ignore[attr-defined]
-        pass
-    return int(revoked_rows.rowcount)  # type: ignore[attr-defined]
-
-
 def list_credentials(session: Session, person_id: int, reach: Reach = UNLIMITED_REACH) -> list[CredentialLine]:
     """Return a person's valid sessions and tokens within ``reach``, newest first."""
     is_listed_kind = Credential.kind.in_([CredentialKind.SESSION, CredentialKind.TOKEN])
     conditions = (
         Credential.person_id == person_id,
         is_listed_kind,
-        *_match_valid(now(session)),
+        *match_valid(now(session)),
         *match_reached_credentials(reach),
     )
     return [
@@ -345,21 +314,6 @@ def _choose_name(person_id: int, names_and_ids: Sequence[tuple[str, str]]) -> st
     return names[0] if names else f"person {person_id}"
 
 
-def _match_valid(current_time: datetime) -> tuple[ColumnElement[bool], ...]:
-    is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
-    return Credential.revoked_at.is_(None), Credential.expires_at > current_time, is_unused, ~_match_revoked_parent()
-
-
-@cache
-def _match_revoked_parent() -> ColumnElement[bool]:
-    """Return the condition that a credential was made with a token that is revoked.
-
-    Every request uses it, and an alias of a table takes milliseconds to create.
-    """
-    token = aliased(Credential)
-    return exists().where(token.id == Credential.token_id, token.revoked_at.is_not(None))
-
-
 def _record_sign_in(session: Session, person_id: int, current_time: datetime) -> None:
     session.execute(
         update(Person).where(Person.id == person_id, Person.signed_in_at.is_(None)).values(signed_in_at=current_time)
@@ -370,11 +324,11 @@ def _end_oldest_sessions(session: Session, person_id: int, current_time: datetim
     conditions = (
         Credential.person_id == person_id,
         Credential.kind == CredentialKind.SESSION,
-        *_match_valid(current_time),
+        *match_valid(current_time),
     )
     newest_query = select(Credential.id).where(*conditions).order_by(Credential.created_at.desc(), Credential.id)
     kept_ids = list(session.scalars(newest_query.limit(MAX_SESSIONS)))
-    _revoke(session, *conditions, Credential.id.not_in(kept_ids))
+    revoke_matching(session, *conditions, Credential.id.not_in(kept_ids))
 
 
 def _find_sign_in_token(session: Session, token: str) -> Credential | None:
@@ -386,7 +340,7 @@ def _find_valid(session: Session, secret: str, kind: CredentialKind) -> Credenti
     if not secret.startswith(_PREFIXES[kind]) or len(secret) > 100:
         return None
     conditions = (Credential.sha256 == _hash_secret(secret), Credential.kind == kind)
-    return session.scalar(select(Credential).where(*conditions, *_match_valid(now(session))))
+    return session.scalar(select(Credential).where(*conditions, *match_valid(now(session))))
 
 
 def _build_row(

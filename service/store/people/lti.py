@@ -1,22 +1,19 @@
-"""Learning platforms: registrations, pending launches, and the persons and courses that they map to.
+"""Learning platforms: registrations, and the persons and courses that launches map to.
 
-Signs and fetches nothing; ``service.lti`` does.
+``lti_launches.py`` keeps the pending launches. Signs and fetches nothing; ``service.lti`` does.
 """
 
 from __future__ import annotations
 
-import hashlib
-import secrets
 from dataclasses import dataclass, field
-from datetime import timedelta
 from urllib.parse import urlsplit
 
-from sqlalchemy import delete, or_, select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
 from service.store.engine import now
-from service.store.people import credentials
+from service.store.people import revocation
 from service.store.people.membership import has_other_access, is_from_platform, set_role
 from service.store.people.students import DEFAULT_COURSE, Students, ensure_course
 from service.store.states import Role
@@ -26,7 +23,6 @@ from service.store.tables.people import (
     Enrolment,
     LtiCourse,
     LtiKey,
-    LtiLaunch,
     LtiPerson,
     LtiPlatform,
     Person,
@@ -34,16 +30,11 @@ from service.store.tables.people import (
 from sim.errors import UsageError
 from submissions.student_identity import Student
 
-_LAUNCH_LIFETIME = timedelta(minutes=10)
-
-
 #: Longest id of a subject, context or deployment. Longer ones are rejected, because cut ones could collide.
 MAX_ID_LENGTH = 250
 _MAX_STUDENT_ID_LENGTH = 500
 #: Longest issuer and client id: a PostgreSQL index contains both.
 MAX_REGISTERED_LENGTH = 255
-#: Maximum number of pending launches of a platform. Anybody can start one, so the oldest are dropped.
-MAX_PENDING = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,15 +65,6 @@ class Platform(Registration):
         origin = parse_origin(url)
         own_origins = (parse_origin(each) for each in (self.authorization_url, self.token_url, self.keys_url))
         return origin is not None and origin in {*own_origins, *self.service_origins}
-
-
-@dataclass(frozen=True, slots=True)
-class PendingLaunch:
-    """A launch that was answered, with the values it started with."""
-
-    platform: Platform
-    nonce: str
-    target: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +141,7 @@ def register_platform(session: Session, registration: Registration) -> int:
 def list_platforms(session: Session) -> list[Platform]:
     """Return all registered platforms, ordered by name."""
     return [
-        _build_platform(row) for row in session.scalars(select(LtiPlatform).order_by(LtiPlatform.name, LtiPlatform.id))
+        build_platform(row) for row in session.scalars(select(LtiPlatform).order_by(LtiPlatform.name, LtiPlatform.id))
     ]
 
 
@@ -169,48 +151,7 @@ def find_platform(session: Session, issuer: str, client_id: str | None) -> Platf
     if client_id is not None:
         query = query.where(LtiPlatform.client_id == client_id)
     platform_rows = session.scalars(query.limit(2)).all()
-    return _build_platform(platform_rows[0]) if len(platform_rows) == 1 else None
-
-
-def begin_launch(session: Session, platform: Platform, target: str) -> tuple[str, str]:
-    """Return a new state and nonce, each valid once and for a few minutes.
-
-    At most ``MAX_PENDING`` launches of a platform are kept.
-    """
-    _lock_platform(session, platform)
-    current_time, is_same_platform = now(session), LtiLaunch.platform_id == platform.id
-    newest_first = select(LtiLaunch.state_sha256).where(is_same_platform).order_by(LtiLaunch.expires_at.desc())
-    is_expired = or_(
-        LtiLaunch.expires_at < current_time, LtiLaunch.state_sha256.in_(newest_first.offset(MAX_PENDING - 1))
-    )
-    session.execute(delete(LtiLaunch).where(is_same_platform, is_expired).execution_options(synchronize_session=False))
-    state, nonce = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
-    session.add(
-        LtiLaunch(
-            state_sha256=_hash_text(state),
-            platform_id=platform.id,
-            nonce=nonce,
-            target=target,
-            expires_at=current_time + _LAUNCH_LIFETIME,
-        )
-    )
-    return state, nonce
-
-
-def has_launch(session: Session, state: str) -> bool:
-    """Whether a launch with this state was started and not completed yet; it may have expired."""
-    return session.get(LtiLaunch, _hash_text(state)) is not None
-
-
-def take_launch(session: Session, state: str) -> PendingLaunch | None:
-    """Return and delete the launch with this state; None if it does not exist or has expired."""
-    row = session.get(LtiLaunch, _hash_text(state), with_for_update={"key_share": True})
-    if row is None:
-        return None
-    session.delete(row)
-    if row.expires_at <= now(session):
-        return None
-    return PendingLaunch(_build_platform(session.get_one(LtiPlatform, row.platform_id)), row.nonce, row.target)
+    return build_platform(platform_rows[0]) if len(platform_rows) == 1 else None
 
 
 def resolve_launch(
@@ -234,7 +175,7 @@ def resolve_launch(
     """
     _check_id("deployment", deployment)
     _check_id("context", context)
-    _lock_platform(session, platform)
+    lock_platform(session, platform)
     link = _find_context_course(session, platform, deployment, context, subject)
     if link is None:
         if role is not Role.INSTRUCTOR:
@@ -267,7 +208,7 @@ def enrol_subject(
     _check_id("subject", subject)
     if len(student.id) > _MAX_STUDENT_ID_LENGTH:
         raise UsageError("the platform's user ID is longer than %(most)s characters", most=_MAX_STUDENT_ID_LENGTH)
-    _lock_platform(session, platform)
+    lock_platform(session, platform)
     session.get_one(Course, course_id, with_for_update={"key_share": True})
     is_subject = (LtiPerson.platform_id == platform.id, LtiPerson.subject == subject)
     known_person = session.scalar(select(LtiPerson).where(*is_subject))
@@ -294,7 +235,7 @@ def _create_enrolment(session: Session, course_id: int, student: Student, person
             id=student.id[:MAX_ID_LENGTH],
         )
     # Existing links to it would sign in another user as this person.
-    credentials.revoke_all(session, row.person_id)
+    revocation.revoke_all(session, row.person_id)
     if person_id is not None:
         unused_person_id, row.person_id = row.person_id, person_id
         session.flush()
@@ -342,7 +283,7 @@ def _find_context_course(
     return undeployed_row
 
 
-def _lock_platform(session: Session, platform: Platform) -> None:
+def lock_platform(session: Session, platform: Platform) -> None:
     """Lock the platform, so that concurrent launches of one subject or context do not both create it."""
     session.get_one(LtiPlatform, platform.id, with_for_update={"key_share": True})
 
@@ -357,9 +298,7 @@ def find_course_link(session: Session, course_id: int) -> CourseLink | None:
     row = session.scalar(select(LtiCourse).where(LtiCourse.course_id == course_id).limit(1))
     if row is None:
         return None
-    return CourseLink(
-        _build_platform(session.get_one(LtiPlatform, row.platform_id)), row.members_url, row.lineitems_url
-    )
+    return CourseLink(build_platform(session.get_one(LtiPlatform, row.platform_id)), row.members_url, row.lineitems_url)
 
 
 def load_subjects(session: Session, platform: Platform, course_id: int) -> dict[str, str]:
@@ -396,7 +335,8 @@ def _create_course(session: Session, title: str) -> int:
     return ensure_course(session, name, now(session))
 
 
-def _build_platform(row: LtiPlatform) -> Platform:
+def build_platform(row: LtiPlatform) -> Platform:
+    """Return the platform of a row."""
     return Platform(
         row.name,
         row.issuer,
@@ -408,7 +348,3 @@ def _build_platform(row: LtiPlatform) -> Platform:
         tuple(row.service_origins),
         id=row.id,
     )
-
-
-def _hash_text(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store.engine import now
-from service.store.people import credentials
+from service.store.people import revocation
 from service.store.people.students import Students, ensure_course
 from service.store.states import Role
 from service.store.tables.courses import Course
@@ -63,7 +63,7 @@ def make_instructor(session: Session, course: str, student: Student) -> Member:
 def set_role(session: Session, row: Enrolment, role: Role) -> None:
     """Set the role of a member. Losing the instructor role revokes the credentials that reach the course."""
     if row.role is Role.INSTRUCTOR and role is not Role.INSTRUCTOR:
-        credentials.revoke_for_course(session, row.person_id, row.course_id)
+        revocation.revoke_for_course(session, row.person_id, row.course_id)
     row.role = role
 
 
@@ -104,7 +104,7 @@ def merge_persons(session: Session, person_id: int, other_id: int) -> None:
     The caller must have locked both.
     """
     for merged_id in (person_id, other_id):
-        credentials.revoke_all(session, merged_id)
+        revocation.revoke_all(session, merged_id)
     for column in (Enrolment.person_id, LtiPerson.person_id, Credential.person_id):
         session.execute(update(column.class_).where(column == other_id).values(person_id=person_id))
     person, other = session.get_one(Person, person_id), session.get_one(Person, other_id)

@@ -18,7 +18,7 @@ from service.operations import people as operations
 from service.operations.context import Actor
 from service.operations.scopes import SCOPES
 from service.store.engine import now
-from service.store.people import credentials, lti, membership
+from service.store.people import credentials, lti, membership, revocation
 from service.store.people.credentials import MAX_SESSIONS, MAX_TOKENS
 from service.store.people.lti import Registration
 from service.store.people.membership import Member
@@ -232,7 +232,7 @@ def test_what_is_made_with_a_token_lasts_no_longer_than_the_token(web: Web, ada:
             assert own.expires_at == until
     assert all(web.browser().get("/api/v1/me", headers=each).status_code == 200 for each in (*made, other))
     with web.store.transaction() as session:
-        credentials.revoke_credential(session, row.credential_id, ada.person_id)
+        revocation.revoke_credential(session, row.credential_id, ada.person_id)
     assert {web.browser().get("/api/v1/me", headers=each).status_code for each in made} == {401}
     assert web.browser().get("/api/v1/me", headers=other).status_code == 200
     assert browser.get("/account").status_code == 303

@@ -29,7 +29,7 @@ from service.store.batches import intake
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import Store
-from service.store.people import lti, membership
+from service.store.people import lti, lti_launches, membership
 from service.store.people.lti import Registration
 from service.store.queue import jobs
 from service.store.states import Role
@@ -240,7 +240,7 @@ def test_the_oldest_launches_make_room_for_new_ones(
     launched: tuple[Web, LearningPlatform], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     web, platform = launched
-    monkeypatch.setattr(lti, "MAX_PENDING", 3)
+    monkeypatch.setattr(lti_launches, "MAX_PENDING", 3)
     browsers = [_browser(web) for _ in range(5)]
     begun = [_begin(browser) for browser in browsers]
     with web.store.reading() as session:

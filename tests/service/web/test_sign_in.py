@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import select
 
 from command import robomark
-from service.store.people import credentials, membership
+from service.store.people import credentials, membership, revocation
 from service.store.people.membership import Member
 from service.store.people.reach import Reach
 from service.store.states import CredentialKind, Role
@@ -122,7 +122,7 @@ def test_a_session_ends_with_the_token_it_was_started_with(web: Web) -> None:
     with web.store.transaction() as session:
         identity = credentials.identify(session, first, CredentialKind.TOKEN)
         assert identity is not None
-        credentials.revoke_credential(session, identity.credential_id, ada.person_id)
+        revocation.revoke_credential(session, identity.credential_id, ada.person_id)
         assert len(credentials.list_credentials(session, ada.person_id)) == 2
     assert browser.get("/account").status_code == 303
     assert other.get("/account").status_code == 200
