@@ -6,8 +6,8 @@ A route without a table row fails the test, and so does a table row without a ro
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import pytest
 from fastapi.routing import iter_route_contexts
@@ -15,10 +15,12 @@ from httpx2 import Response
 from starlette.testclient import TestClient
 
 from paths import DATA
+from service.web.rate_limits import RateLimits
 from web import Web, csrf, web_in
 from web_world import create_upload, filled, make_world
 
 API = "/api/v1/"
+Restore = Callable[[], None]
 _TABLES = sorted((DATA / "access").glob("*.toml"))
 ROUTES = {route: who for table in _TABLES for route, who in tomllib.loads(table.read_text()).items()}
 #: Routes of forms on pages. Other sites may post only to routes marked for it, and programs have no forms.
@@ -50,7 +52,7 @@ class Signed:
 
 
 @pytest.fixture(scope="module")
-def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Signed]]:
+def installation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Signed, Restore]]:
     with web_in(tmp_path_factory.mktemp("home")) as web:
         world = make_world(web)
         members = {
@@ -64,7 +66,33 @@ def signed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Sign
         words = {who: csrf(browser.get("/account")) for who, browser in browsers.items() if who != "nobody"}
         everything = ("read", "submit", "mark", "manage", "sign-in")
         tokens = {who: web.token(member, *everything) for who, member in members.items()}
-        yield web, Signed(browsers, tokens, words, world.values)
+        yield web, Signed(browsers, tokens, words, world.values), _snapshot(web, browsers.values())
+
+
+@pytest.fixture
+def signed(installation: tuple[Web, Signed, Restore]) -> tuple[Web, Signed]:
+    """Return the installation as it was made. Routes remove people, credentials and assignments that others need."""
+    web, signed_requests, restore = installation
+    restore()
+    return web, signed_requests
+
+
+def _snapshot(web: Web, browsers: Iterable[TestClient]) -> Restore:
+    """Return a function that restores the database, the cookies of the browsers, and the rate limits."""
+    database = web.settings.home / "robomark.db"
+    web.store.engine.dispose()
+    data, cookies = database.read_bytes(), [(browser, list(browser.cookies.jar)) for browser in browsers]
+
+    def restore() -> None:
+        web.store.engine.dispose()
+        database.write_bytes(data)
+        web.app.state.context = replace(web.app.state.context, limits=RateLimits())
+        for browser, kept in cookies:
+            browser.cookies.clear()
+            for cookie in kept:
+                browser.cookies.jar.set_cookie(cookie)
+
+    return restore
 
 
 def _routes(web: Web) -> set[str]:
@@ -149,8 +177,5 @@ def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signe
 def _ask(signed_requests: Signed, who: str, method: str, path: str) -> Response:
     if path.startswith(API):
         return signed_requests.browsers["nobody"].request(method, path, headers=signed_requests.tokens.get(who, {}))
-    # These routes end sessions and tokens that later tests need.
-    if path in ("/sign-out", "/account/end-others") and who != "nobody":
-        return signed_requests.browsers[who].get("/account")
     headers = {"x-csrf-token": signed_requests.words[who]} if who in signed_requests.words else {}
     return signed_requests.browsers[who].request(method, path, headers=headers)
