@@ -13,6 +13,7 @@ from typing import Any
 from responders.message_format import JSON, parse_answer
 from service.grading.judging.message_parts import describe_fault
 from sim.recording import Fault, Message, Recording
+from sim.sentences import Sentence
 
 
 class MissingValue:
@@ -110,4 +111,6 @@ class Answers:
     def describe_silence(self, index: int) -> str:
         """Return a sentence part that the message at ``index`` had no answer, with the reason if it is recorded."""
         fault = self.find_fault_after(index) or (self._faults[-1] if self._faults else None)
-        return "there was no answer" + (f": {describe_fault(fault)}" if fault else "")
+        if fault is None:
+            return Sentence("there was no answer")
+        return Sentence("there was no answer: %(fault)s", fault=describe_fault(fault))

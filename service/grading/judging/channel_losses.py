@@ -6,6 +6,7 @@ The modules of the families decide the marks.
 from __future__ import annotations
 
 from sim.recording import Message
+from sim.sentences import Sentence
 
 
 def is_lost_by_chance(message: Message) -> bool:
@@ -22,11 +23,14 @@ def describe_loss(message: Message) -> str:
     """Return why a text did not arrive as sent, for use in brackets after ``the channel lost it``."""
     match message.lost:
         case "out of range":
-            distance = round(message.distance or 0, 1)
-            return f"the robot was {distance:g} mm from the receiver, which is out of the link's range"
+            return Sentence(
+                "the robot was %(distance)g mm from the receiver, which is out of the link's range",
+                distance=round(message.distance or 0, 1),
+            )
         case "facing away":
-            return f"the robot faced {abs(round(message.angle or 0, 1)):g}° away from the receiver"
+            angle = abs(round(message.angle or 0, 1))
+            return Sentence("the robot faced %(angle)g° away from the receiver", angle=angle)
         case "blocked":
-            return "a wall or an obstacle was between the robot and the receiver"
+            return Sentence("a wall or an obstacle was between the robot and the receiver")
         case _:
-            return "by chance"
+            return Sentence("by chance")

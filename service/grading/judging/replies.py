@@ -23,18 +23,20 @@ from service.grading.judging.answers import (
     parse_json_answer,
 )
 from service.grading.judging.channel_losses import describe_loss, is_lost_by_chance, is_out_of_reach
+from service.grading.judging.joined_texts import join_with_or
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.text_conditions import describe_conditions, is_accepted_text, is_same_text
 from sim.recording import Message
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence, join_with_and
 from submissions.criteria.replies import Replies, list_allowed_answers
 
 #: Messages that were sent instead are quoted up to this number and length.
 _MAX_QUOTED_MESSAGES, _MAX_QUOTED_LENGTH = 3, 60
 
-_NOTHING_TO_ANSWER = "The channel lost every message on its way by chance, so there was nothing to answer."
+_NOTHING_TO_ANSWER = Sentence("The channel lost every message on its way by chance, so there was nothing to answer.")
 
 
 @declare_judge(Replies)
@@ -63,17 +65,7 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
     ]
     excused_count = len({message.text for message in unreceived_messages if is_lost_by_chance(message)})
     if count + excused_count < criterion.at_least:
-        count_clause = f"only {count} different reached it" if count else "none reached it"
-        unreachable_message = next((message for message in unreceived_messages if is_out_of_reach(message)), None)
-        reason = (
-            f": the channel lost {quote_text(unreachable_message.text)} ({describe_loss(unreachable_message)})"
-            if unreachable_message
-            else ""
-        )
-        requirement = f"at least {criterion.at_least} of {_describe_messages(criterion, pair)}"
-        return fail_with(
-            f"Expected {pair.receiver_name} to be sent {requirement}, but {count_clause}{reason}.", score=Fraction(0)
-        )
+        return fail_with(_describe_few_questions(criterion, pair, count, unreceived_messages))
     if excused_count and not count:
         return pass_with(_NOTHING_TO_ANSWER)
     answers = Answers(recording)
@@ -82,17 +74,64 @@ def judge_replies(criterion: Replies, trial: TrialResult) -> Outcome:
         mistakes = ((message, _describe_mistake(criterion, answers, index), index) for index, message in attempts)
         wrong_answers += itertools.islice((each for each in mistakes if each[1]), 1)
     if not wrong_answers:
-        return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
+        return _pass_all(pair, count)
     message, mistake, index = min(wrong_answers, key=lambda each: each[0].t)
     right_count = count - len(wrong_answers)
     return fail_with(
-        f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
-        f"{_describe_expected(criterion)}, but {mistake} ({right_count} of {count} answered as expected).",
+        Sentence(
+            "%(problem)s (%(right)s of %(count)s answered as expected).",
+            problem=_describe_problem(pair, message.received, _describe_expected(criterion), mistake),
+            right=right_count,
+            count=count,
+        ),
         message.t,
         get_pose_at(recording, message.t),
         Fraction(right_count, count),
         findings=_find_value(criterion, answers, index),
     )
+
+
+def _describe_few_questions(
+    criterion: Replies, pair: AgentPair, count: int, unreceived_messages: Sequence[Message]
+) -> str:
+    """Return that too few messages reached the responder, with the reason if they were sent from out of reach."""
+    problem = Sentence("only %(count)s different reached it", count=count) if count else Sentence("none reached it")
+    lost_message = next((message for message in unreceived_messages if is_out_of_reach(message)), None)
+    if lost_message is not None:
+        problem = Sentence(
+            "%(problem)s: the channel lost %(text)s (%(loss)s)",
+            problem=problem,
+            text=quote_text(lost_message.text),
+            loss=describe_loss(lost_message),
+        )
+    return Sentence(
+        "Expected %(receiver)s to be sent at least %(count)s of %(messages)s, but %(problem)s.",
+        receiver=pair.receiver_name,
+        count=criterion.at_least,
+        messages=_describe_messages(criterion, pair),
+        problem=problem,
+    )
+
+
+def _describe_problem(pair: AgentPair, question: str, expected_answer: str, mistake: str) -> str:
+    """Return a clause on a wrong answer."""
+    return Sentence(
+        "Expected %(receiver)s to answer %(question)s with %(answer)s, but %(mistake)s",
+        receiver=pair.receiver_name,
+        question=quote_text(question),
+        answer=expected_answer,
+        mistake=mistake,
+    )
+
+
+def _add_score(problem: str, right_count: int, count: int) -> str:
+    """Return the sentence on a problem, with the number of right answers."""
+    return Sentence("%(problem)s (%(right)s of %(count)s right).", problem=problem, right=right_count, count=count)
+
+
+def _pass_all(pair: AgentPair, count: int) -> Outcome:
+    message = "%(receiver)s answered %(count)s of %(count)s messages as expected."
+    return pass_with(Sentence(message, receiver=pair.first_words, count=count))
 
 
 def _judge_expected(
@@ -109,15 +148,18 @@ def _judge_expected(
             if is_same_text(each.received, text, criterion.ignore_case)
         ]
         allowed_answers = list_allowed_answers(answer)
-        answer_texts = " or ".join(quote_text(as_text(each)) for each in allowed_answers)
-        expected_answer = answer_texts + (f" at {criterion.path}" if criterion.path else "")
+        expected_answer = _add_path(criterion, join_with_or([quote_text(as_text(each)) for each in allowed_answers]))
         if not matching_messages:
             tries = [message for message in sent_messages if is_same_text(message.text, text, criterion.ignore_case)]
             if tries and all(map(is_lost_by_chance, tries)):
                 continue
             outcome = fail_with(
-                f"Expected {pair.receiver_name} to be sent {quote_text(text)}, but "
-                f"{_explain_unsent(tries, sent_messages)}."
+                Sentence(
+                    "Expected %(receiver)s to be sent %(text)s, but %(problem)s",
+                    receiver=pair.receiver_name,
+                    text=quote_text(text),
+                    problem=_explain_unsent(tries, sent_messages),
+                )
             )
         else:
             mistakes = [
@@ -130,8 +172,7 @@ def _judge_expected(
                 continue
             index, message = matching_messages[wrong_index]
             outcome = fail_with(
-                f"Expected {pair.receiver_name} to answer {quote_text(text)} with {expected_answer}, but "
-                f"{mistakes[wrong_index]}.",
+                _describe_problem(pair, text, expected_answer, mistakes[wrong_index]),
                 message.t,
                 get_pose_at(pair.recording, message.t),
                 findings=_find_value(criterion, answers, index),
@@ -141,9 +182,9 @@ def _judge_expected(
     if first_failure is None and not count:
         return pass_with(_NOTHING_TO_ANSWER)
     if first_failure is None:
-        return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
+        return _pass_all(pair, count)
     return fail_with(
-        f"{first_failure.message[:-1]} ({right_count} of {count} right).",
+        _add_score(first_failure.message, right_count, count),
         first_failure.t,
         first_failure.pose,
         Fraction(right_count, count),
@@ -165,32 +206,33 @@ def _judge_order(criterion: Replies, received_messages: list[tuple[int, Message]
     score = Fraction(right_count, count)
     if wrong_answers:
         message, expected_answer, mistake = wrong_answers[0]
+        problem = _describe_problem(pair, message.received, quote_text(expected_answer), mistake)
         return fail_with(
-            f"Expected {pair.receiver_name} to answer {quote_text(message.received)} with "
-            f"{quote_text(expected_answer)}, but {mistake} ({right_count} of {count} right).",
-            message.t,
-            get_pose_at(pair.recording, message.t),
-            score,
+            _add_score(problem, right_count, count), message.t, get_pose_at(pair.recording, message.t), score
         )
     if len(questions) != count:
-        count_clause = f"{len(questions)} reached it" if questions else "none reached it"
-        return fail_with(f"Expected {pair.receiver_name} to answer {count} messages, but {count_clause}.", score=score)
-    return pass_with(f"{pair.receiver_name.capitalize()} answered {count} of {count} messages as expected.")
+        actual = Sentence("%(count)s reached it", count=len(questions)) if questions else Sentence("none reached it")
+        expectation = "Expected %(receiver)s to answer %(count)s messages, but %(actual)s."
+        message_text = Sentence(expectation, receiver=pair.receiver_name, count=count, actual=actual)
+        return fail_with(message_text, score=score)
+    return _pass_all(pair, count)
 
 
 def _explain_unsent(tries: Sequence[Message], sent_messages: Sequence[Message]) -> str:
     """Return why a text never reached the responder, and what was sent instead."""
     unreachable_message = next((message for message in tries if is_out_of_reach(message)), None)
     if unreachable_message:
-        return f"the channel lost it ({describe_loss(unreachable_message)})"
+        return Sentence("the channel lost it (%(loss)s)", loss=describe_loss(unreachable_message))
     texts = tuple(dict.fromkeys(message.text for message in sent_messages if len(message.text) <= _MAX_QUOTED_LENGTH))
-    return f"it was not; it was sent {quote_list(texts[:_MAX_QUOTED_MESSAGES])}" if texts else "it was not"
+    if not texts:
+        return Sentence("it was not")
+    return Sentence("it was not; it was sent %(texts)s", texts=quote_list(texts[:_MAX_QUOTED_MESSAGES]))
 
 
 def _describe_wrong_answer(criterion: Replies, answers: Answers, index: int, allowed_answers: Sequence[object]) -> str:
     """Return the problem with the answer to the message at ``index``; empty if it is one of the correct ones."""
     mistakes = [_describe_mismatch(criterion, answers, index, each) for each in allowed_answers]
-    return "" if "" in mistakes else mistakes[0] if mistakes else "no answer is correct"
+    return "" if "" in mistakes else mistakes[0] if mistakes else Sentence("no answer is correct")
 
 
 def _describe_mismatch(criterion: Replies, answers: Answers, index: int, answer: object) -> str:
@@ -198,23 +240,35 @@ def _describe_mismatch(criterion: Replies, answers: Answers, index: int, answer:
     reply = answers.find_answer(index)
     if reply is None:
         return answers.describe_silence(index)
+    answer_text = quote_text(reply.text)
     if criterion.is_json and not is_json_answer(reply.text):
-        return f"it answered {quote_text(reply.text)}, which is not JSON:: and well-formed JSON"
+        return Sentence("it answered %(answer)s, which is not JSON:: and well-formed JSON", answer=answer_text)
     if criterion.agents:
         value = parse_json_answer(JSON + reply.text) if reply.note == VALUE else reply.text
-        mistake = "it answered " + ("the text " if isinstance(value, str) else "") + quote_text(reply.text)
-        return "" if is_same_value(value, answer) else mistake
+        if is_same_value(value, answer):
+            return ""
+        if isinstance(value, str):
+            return Sentence("it answered the text %(answer)s", answer=answer_text)
+        return Sentence("it answered %(answer)s", answer=answer_text)
     if criterion.path is None:
         is_same = is_same_text(reply.text, str(answer), criterion.ignore_case)
-        return "" if is_same else f"it answered {quote_text(reply.text)}"
+        return "" if is_same else Sentence("it answered %(answer)s", answer=answer_text)
     actual = find_at_path(parse_json_answer(reply.text), criterion.path)
     if actual is MISSING:
-        return f"there is nothing at {criterion.path} in its answer {quote_text(reply.text)}"
+        return _describe_missing_value(criterion.path, answer_text)
     if isinstance(actual, str) and isinstance(answer, str):
         is_same = is_same_text(actual, answer, criterion.ignore_case)
     else:
         is_same = is_same_value(actual, answer)
-    return "" if is_same else f"it has {quote_text(as_text(actual))} at {criterion.path}"
+    return "" if is_same else _describe_other_value(actual, criterion.path)
+
+
+def _describe_missing_value(path: str, answer_text: str) -> str:
+    return Sentence("there is nothing at %(path)s in its answer %(answer)s", path=path, answer=answer_text)
+
+
+def _describe_other_value(value: object, path: str) -> str:
+    return Sentence("it has %(value)s at %(path)s", value=quote_text(as_text(value)), path=path)
 
 
 def _describe_mistake(criterion: Replies, answers: Answers, index: int) -> str:
@@ -222,17 +276,18 @@ def _describe_mistake(criterion: Replies, answers: Answers, index: int) -> str:
     reply = answers.find_answer(index)
     if reply is None:
         return answers.describe_silence(index)
+    answer_text = quote_text(reply.text)
     if criterion.is_json and not is_json_answer(reply.text):
-        return f"it answered {quote_text(reply.text)}, which is not JSON:: and well-formed JSON"
+        return Sentence("it answered %(answer)s, which is not JSON:: and well-formed JSON", answer=answer_text)
     text = reply.text
     if criterion.path is not None:
         actual = find_at_path(parse_json_answer(reply.text), criterion.path)
         if actual is MISSING:
-            return f"there is nothing at {criterion.path} in its answer {quote_text(reply.text)}"
+            return _describe_missing_value(criterion.path, answer_text)
         if criterion.value is not None and not is_same_value(actual, criterion.value):
-            return f"it has {quote_text(as_text(actual))} at {criterion.path}"
+            return _describe_other_value(actual, criterion.path)
         text = as_text(actual)
-    return "" if is_accepted_text(criterion, text) else f"it answered {quote_text(text)}"
+    return "" if is_accepted_text(criterion, text) else Sentence("it answered %(answer)s", answer=quote_text(text))
 
 
 def _find_value(criterion: Replies, answers: Answers, index: int) -> tuple[OtherAnswer, ...]:
@@ -252,19 +307,23 @@ def _is_question(criterion: Replies, text: str) -> bool:
 
 def _describe_messages(criterion: Replies, pair: AgentPair) -> str:
     if criterion.to:
-        return f"the texts {quote_list(criterion.to, 'or')}"
+        return Sentence("the texts %(texts)s", texts=quote_list(criterion.to, "or"))
     if criterion.to_starts_with:
-        return f"the texts that start with {quote_list(criterion.to_starts_with, 'or')}"
-    return f"{pair.sender_name}'s messages"
+        return Sentence("the texts that start with %(texts)s", texts=quote_list(criterion.to_starts_with, "or"))
+    return Sentence("%(sender)s's messages", sender=pair.sender_name)
 
 
 def _describe_expected(criterion: Replies) -> str:
     clauses = ["JSON"] if criterion.is_json else []
-    path_clause = f" at {criterion.path}" if criterion.path else ""
     if criterion.value is not None:
-        clauses.append(f"{quote_text(as_text(criterion.value))}{path_clause}")
+        clauses.append(_add_path(criterion, quote_text(as_text(criterion.value))))
     elif criterion.has_conditions:
-        clauses.append(f"{describe_conditions(criterion)}{path_clause}")
-    elif path_clause:
-        clauses.append(f"something{path_clause}")
-    return " and ".join(clauses) or "a text"
+        clauses.append(_add_path(criterion, describe_conditions(criterion)))
+    elif criterion.path:
+        clauses.append(_add_path(criterion, Sentence("something")))
+    return join_with_and(clauses) or Sentence("a text")
+
+
+def _add_path(criterion: Replies, value: str) -> str:
+    """Return a value in words, with the criterion's path to it, if it has one."""
+    return Sentence("%(value)s at %(path)s", value=value, path=criterion.path) if criterion.path else value

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 
 from service.grading.findings import MissingEntry
 from service.grading.grade import Measure, TrialResult
@@ -16,16 +17,41 @@ from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.report_rows import Entry, ReportTokens, Row, can_match_row, is_equivalent_row, is_near
+from service.grading.judging.report_sentences import (
+    describe_expectation,
+    describe_expected_entries,
+    describe_missing_entry,
+    describe_missing_report,
+    describe_right_report,
+    describe_wrong_report,
+    format_entries,
+    format_entry,
+)
 from service.grading.judging.sensor_readings import INSTRUMENTS, match_readings
 from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.grading.judging.text_tokens import Token, find_words, split_words, tokenize_text
+from service.language import translatable
 from sim.floors import list_label_names
 from sim.recording import Recording, TimedText
 from sim.recording_values import get_pose_at, rebuild_floor
+from sim.sentences import Sentence
 from submissions.criteria.places import Zone
 from submissions.criteria.reporting import EventAt, Events, Reports
 
-_VERBS = {"print": "print", "speech": "say", "either": "report", "reply": "answer"}
+_EXPECTED_EVENTS: Mapping[str, str] = MappingProxyType(
+    {
+        "print": translatable("Expected %(text)s to be printed with %(part)s at %(zone)s"),
+        "speech": translatable("Expected %(text)s to be said with %(part)s at %(zone)s"),
+        "either": translatable("Expected %(text)s to be reported with %(part)s at %(zone)s"),
+    }
+)
+_PARTS: Mapping[str, Sentence] = MappingProxyType(
+    {
+        "left": Sentence("the left light sensor"),
+        "right": Sentence("the right light sensor"),
+        "middle": Sentence("the robot"),
+    }
+)
 #: The label of a place that has none.
 NO_LABEL = "nothing"
 
@@ -41,21 +67,17 @@ def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
         criterion, answer_row, rows, [line.text for line in lines], [token for token, _ in timed_tokens]
     )
     guesses = _count_guesses(criterion, answer_row, timed_tokens, trial.recording)
-    return apply_stray_penalty(
-        outcome, criterion, len(answer_row), Strays(f"{guesses} other numbers were reported as well", others=guesses)
-    )
+    strays = Strays(Sentence("%(count)s other numbers were reported as well", count=guesses), others=guesses)
+    return apply_stray_penalty(outcome, criterion, len(answer_row), strays)
 
 
 def _judge_report(
     criterion: Reports, answer_row: Row, rows: frozenset[Row], texts: Sequence[str], tokens: Sequence[Token]
 ) -> Outcome:
-    part_name = "the responder" if criterion.source == "reply" else "the program"
-    verb = _VERBS[criterion.source]
-    expectation = (
-        f"Expected {part_name} to {verb} {_format_entries(answer_row)}{_describe_tolerance(criterion, answer_row)}"
-    )
+    entries = describe_expected_entries(criterion, answer_row)
+    expectation = describe_expectation(criterion, entries)
     if not texts:
-        return fail_with(f"{expectation}, but it did not {verb} anything.")
+        return fail_with(describe_missing_report(criterion, expectation))
     report = ReportTokens(tokens, rows, criterion.leeway)
     match = report.find(answer_row)
     measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(match.values, 1))
@@ -64,29 +86,27 @@ def _judge_report(
         criterion, answer_row, rows, report
     )
     if problem:
-        return fail_with(f"{expectation}, but {problem}: {report_text}.", measures=measures)
+        return fail_with(describe_wrong_report(expectation, problem, report_text), measures=measures)
     is_guess = _is_guess(criterion, answer_row, report, match.count)
     if match.count < len(answer_row):
-        missing_entry = _format_entries(answer_row[match.count : match.count + 1])
-        position_clause = f" after {_format_entries(answer_row[match.count - 1 : match.count])}" if match.count else ""
-        guess_clause = ", and it reported as many entries of most other poses" if is_guess else ""
+        problem = describe_missing_entry(answer_row, match.count, is_guess)
         return fail_with(
-            f"{expectation}, but {missing_entry} did not come{position_clause}{guess_clause}: {report_text}.",
+            describe_wrong_report(expectation, problem, report_text),
             score=Fraction(0 if is_guess else match.count, len(answer_row)),
             measures=measures,
             findings=(_build_missing_entry(answer_row, match.count, texts),),
         )
     if is_guess:
-        return fail_with(
-            f"{expectation} and no entries of other poses, but it reported those as well: {report_text}.",
-            measures=measures,
-        )
-    return pass_with(f"{part_name.capitalize()} reported {_format_entries(answer_row)}.", measures=measures)
+        exact_entries = Sentence("%(entries)s and no entries of other poses", entries=entries)
+        exact_expectation = describe_expectation(criterion, exact_entries)
+        problem = Sentence("it reported those as well")
+        return fail_with(describe_wrong_report(exact_expectation, problem, report_text), measures=measures)
+    return pass_with(describe_right_report(criterion, answer_row), measures=measures)
 
 
 def _build_missing_entry(answer_row: Row, number: int, texts: Sequence[str]) -> MissingEntry:
-    previous = _format_entry(answer_row[number - 1]) if number else ""
-    return MissingEntry(_format_entry(answer_row[number]), previous, tuple(texts))
+    previous = format_entry(answer_row[number - 1]) if number else ""
+    return MissingEntry(format_entry(answer_row[number]), previous, tuple(texts))
 
 
 def _find_expected_row(criterion: Reports, trial: TrialResult) -> Row:
@@ -172,9 +192,9 @@ def _describe_other_label(criterion: Reports, answer_row: Row, rows: frozenset[R
     if criterion.expected != "label":
         return ""
     other_labels = sorted(
-        _format_entries(row) for row in rows if report.has(row) and not can_match_row(row, answer_row, criterion.leeway)
+        format_entries(row) for row in rows if report.has(row) and not can_match_row(row, answer_row, criterion.leeway)
     )
-    return f"it named {other_labels[0]}" if other_labels else ""
+    return Sentence("it named %(text)s", text=other_labels[0]) if other_labels else ""
 
 
 def _describe_forbidden_text(criterion: Reports, answer_row: Sequence[Entry], tokens: Sequence[Token]) -> str:
@@ -185,29 +205,15 @@ def _describe_forbidden_text(criterion: Reports, answer_row: Sequence[Entry], to
         parts = split_words(text)
         is_expected = any(find_words(entry, parts) is not None for entry in expected_texts)
         if not is_expected and find_words(words, parts) is not None:
-            return f"it named {quote_text(text)}"
+            return Sentence("it named %(text)s", text=quote_text(text))
     if criterion.only:
         numbers = (each for each in tokens if each.value is not None)
         foreign_number = next(
             (each for each in numbers if not _is_one_of(each.value or 0.0, answer_row, criterion.leeway)), None
         )
         if foreign_number is not None:
-            return f"it reported {quote_text(foreign_number.word)[1:-1]} as well"
+            return Sentence("it reported %(number)s as well", number=quote_text(foreign_number.word)[1:-1])
     return ""
-
-
-def _describe_tolerance(criterion: Reports, answer_row: Sequence[Entry]) -> str:
-    """Return the allowed difference of numbers in words, if it is large enough to matter."""
-    has_numbers = any(not isinstance(entry, str) for entry in answer_row)
-    return f" (within {criterion.leeway:g})" if has_numbers and criterion.leeway >= 1 else ""
-
-
-def _format_entries(entries: Sequence[Entry]) -> str:
-    return quote_list(tuple(map(_format_entry, entries)))
-
-
-def _format_entry(entry: Entry) -> str:
-    return entry if isinstance(entry, str) else f"{entry:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +234,8 @@ def judge_events(criterion: Events, trial: TrialResult) -> Outcome:
     mentions = _collect_mentions(criterion, trial.recording)
     outcome = _judge_mentions(criterion, mentions, trial.recording)
     misplaced_count = _count_misplaced(criterion, mentions)
-    strays = Strays(f"these texts came {misplaced_count} times at wrong places", misplaced_count)
+    description = Sentence("these texts came %(count)s times at wrong places", count=misplaced_count)
+    strays = Strays(description, misplaced_count)
     return apply_stray_penalty(outcome, criterion, len(criterion.events), strays)
 
 
@@ -272,7 +279,10 @@ def _judge_mentions(criterion: Events, mentions: Sequence[_Mention], recording: 
     )
     end = matched_mentions[-1].line.t
     return pass_with(
-        f"{quote_list(names)} came in order, each at its place.", end, get_pose_at(recording, end), measures
+        Sentence("%(texts)s came in order, each at its place.", texts=quote_list(names)),
+        end,
+        get_pose_at(recording, end),
+        measures,
     )
 
 
@@ -320,8 +330,12 @@ def _fail_for_stray(
 ) -> Outcome:
     (x, y), t = mention.place, mention.line.t
     return fail_with(
-        f"{_describe_expected(criterion, event)} and not at the place of another text, but it came at ({x:.1f}, "
-        f"{y:.1f}) as well.",
+        Sentence(
+            "%(expected)s and not at the place of another text, but it came at (%(x).1f, %(y).1f) as well.",
+            expected=_describe_expected(criterion, event),
+            x=x,
+            y=y,
+        ),
         t,
         get_pose_at(recording, t),
         Fraction(len(matched_mentions), len(criterion.events)),
@@ -329,9 +343,12 @@ def _fail_for_stray(
 
 
 def _describe_expected(criterion: Events, event: EventAt) -> str:
-    part_name = "the robot" if criterion.sensor == "middle" else f"the {criterion.sensor} light sensor"
-    verb = {"speech": "said", "print": "printed", "either": "reported"}[criterion.source]
-    return f"Expected {quote_text(event.text[0])} to be {verb} with {part_name} at {describe_zone(event.zone)}"
+    return Sentence(
+        _EXPECTED_EVENTS[criterion.source],
+        text=quote_text(event.text[0]),
+        part=_PARTS[criterion.sensor],
+        zone=describe_zone(event.zone),
+    )
 
 
 def _fail_for_missed_event(
@@ -345,10 +362,13 @@ def _fail_for_missed_event(
     score = Fraction(len(matched_mentions), len(criterion.events))
     misplaced_mention = next((mention for mention in later_mentions if _has_event_text(mention, event)), None)
     if misplaced_mention is None:
-        last_line = matched_mentions[-1].line if matched_mentions else None
-        position_clause = f" after {quote_text(last_line.text)}" if last_line else ""
-        t = last_line.t if last_line else None
-        pose = None if t is None else get_pose_at(recording, t)
-        return fail_with(f"{expected}, but it did not come{position_clause}.", t, pose, score)
+        if not matched_mentions:
+            return fail_with(Sentence("%(expected)s, but it did not come.", expected=expected), score=score)
+        last_line = matched_mentions[-1].line
+        message = Sentence(
+            "%(expected)s, but it did not come after %(text)s.", expected=expected, text=quote_text(last_line.text)
+        )
+        return fail_with(message, last_line.t, get_pose_at(recording, last_line.t), score)
     (x, y), t = misplaced_mention.place, misplaced_mention.line.t
-    return fail_with(f"{expected}, but the text came at ({x:.1f}, {y:.1f}).", t, get_pose_at(recording, t), score)
+    message = Sentence("%(expected)s, but the text came at (%(x).1f, %(y).1f).", expected=expected, x=x, y=y)
+    return fail_with(message, t, get_pose_at(recording, t), score)

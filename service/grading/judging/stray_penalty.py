@@ -10,6 +10,7 @@ from fractions import Fraction
 
 from service.grading.findings import StrayItems
 from service.grading.judging.outcome import Outcome, fail_with
+from sim.sentences import Sentence, join_sentences
 from submissions.criteria.common import CriterionWithStrays
 
 #: This many irrelevant items weigh as much as one required item in a wrong place.
@@ -18,7 +19,7 @@ _OTHERS_PER_ITEM = 20
 
 @dataclass(frozen=True, slots=True)
 class Strays:
-    """Stray items: output that was not required. ``words`` describes it in a sentence, after "besides"."""
+    """Stray items: output that was not required. ``words`` is a clause that describes it."""
 
     words: str
     misplaced: int = 0  # required items in a wrong place
@@ -36,8 +37,13 @@ def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, count:
     if excess <= 0:
         return outcome
     return fail_with(
-        f"{outcome.message} Also, {strays.words}. This costs marks. Give only the required answers, not every "
-        "possible one.",
+        join_sentences(
+            outcome.message,
+            Sentence(
+                "Also, %(strays)s. This costs marks. Give only the required answers, not every possible one.",
+                strays=strays.words,
+            ),
+        ),
         outcome.t,
         outcome.pose,
         outcome.score * count / (count + excess),

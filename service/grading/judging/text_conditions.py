@@ -9,11 +9,9 @@ from collections.abc import Sequence
 
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.text_tokens import find_words, split_words
+from sim.sentences import Sentence, join_with_and
 from submissions.criteria.expressions import has_match
 from submissions.criteria.texts import TextConditions
-
-#: The beginning of conditions that are more than quoted texts.
-SOMETHING = "something that "
 
 
 def is_accepted_text(criterion: TextConditions, text: str) -> bool:
@@ -35,23 +33,26 @@ def is_accepted_text(criterion: TextConditions, text: str) -> bool:
 
 def describe_conditions(criterion: TextConditions) -> str:
     """Return the conditions in words: ``"x" or "y"``, ``something that contains "x"``; empty without conditions."""
-    has_other_conditions = (
-        criterion.starts_with or criterion.contains or criterion.among or criterion.matches is not None
-    )
-    if criterion.equals and not has_other_conditions:
-        return quote_list(criterion.equals, "or")
+    clauses = describe_clauses(criterion)
+    if clauses:
+        return Sentence("something that %(clauses)s", clauses=clauses)
+    return quote_list(criterion.equals, "or") if criterion.equals else ""
+
+
+def describe_clauses(criterion: TextConditions) -> str:
+    """Return the conditions as clauses: ``contains "x" and ...``; empty if they are nothing but a list of texts."""
     clauses = []
-    if criterion.equals:
-        clauses.append(f"is {quote_list(criterion.equals, 'or')}")
     if criterion.starts_with:
-        clauses.append(f"starts with {quote_list(criterion.starts_with, 'or')}")
+        clauses.append(Sentence("starts with %(texts)s", texts=quote_list(criterion.starts_with, "or")))
     if criterion.contains:
-        clauses.append(f"contains {quote_list(criterion.contains)}")
+        clauses.append(Sentence("contains %(texts)s", texts=quote_list(criterion.contains)))
     if criterion.among:
-        clauses.append(f"names only one of {quote_list(criterion.among)}")
+        clauses.append(Sentence("names only one of %(texts)s", texts=quote_list(criterion.among)))
     if criterion.matches is not None:
-        clauses.append(f"matches the pattern {quote_text(criterion.matches)}")
-    return f"{SOMETHING}{' and '.join(clauses)}" if clauses else ""
+        clauses.append(Sentence("matches the pattern %(pattern)s", pattern=quote_text(criterion.matches)))
+    if criterion.equals and clauses:
+        clauses.insert(0, Sentence("is %(texts)s", texts=quote_list(criterion.equals, "or")))
+    return join_with_and(clauses)
 
 
 def is_same_text(text: str, expected: str, ignore_case: bool) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 from service.grading.findings import ExtraText
@@ -20,39 +20,33 @@ from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.robot_queue import collect_queue_lines, is_queued, judge_queue_growth
 from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.grading.judging.text_conditions import (
-    SOMETHING,
+    describe_clauses,
     describe_conditions,
     is_accepted_text,
     is_same_text,
     normalise_text,
 )
+from service.grading.judging.text_wordings import (
+    PRINT,
+    RECEIVED_TEXT,
+    RESPONDER_PRINT,
+    SENT_TEXT,
+    SPEECH,
+    TextWording,
+    build_agent_wording,
+)
 from sim.recording import Recording, TimedText
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence, join_sentences
 from submissions.criteria.expressions import has_match
 from submissions.criteria.texts import Messages, Prints, Says, TextSequence
-
-
-@dataclass(frozen=True, slots=True)
-class TextWording:
-    """The wording for a kind of text: the robot, say, said. ``addressed`` texts have a receiver, unlike prints."""
-
-    who: str
-    verb: str
-    past: str
-    addressed: bool = False
-
 
 #: The beginning of a text that is compared, in characters.
 _MAX_COMPARED = 200
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*")
 
-_EXCUSED = "Messages lost by chance count as received."
-_PRINT = TextWording("the program", "print", "printed")
-_RESPONDER_PRINT = TextWording("the responder", "print", "printed")
-_SPEECH_WORDING = TextWording("the robot", "say", "said")
-_SEND = TextWording("the robot", "send", "sent", addressed=True)
-_RECEIVE = TextWording("the robot", "receive", "received")
-
+_EXCUSED = Sentence("Messages lost by chance count as received.")
+_NOTHING = Sentence("nothing")
 
 #: The heading of each cell's output in a notebook's recording.
 _CELL_HEADING = re.compile(r"--- cell \d+ ---")
@@ -63,8 +57,8 @@ def judge_prints(criterion: Prints, trial: TrialResult) -> Outcome:
     """Judge the program's prints call by call, or the responder's and notebook cells' prints line by line."""
     recording = trial.recording
     if criterion.of == "responder":
-        return judge_sequence(criterion, _collect_responder_lines(recording), _RESPONDER_PRINT, recording)
-    return judge_sequence(criterion, recording.printed, _PRINT, recording)
+        return judge_sequence(criterion, _collect_responder_lines(recording), RESPONDER_PRINT, recording)
+    return judge_sequence(criterion, recording.printed, PRINT, recording)
 
 
 def _collect_responder_lines(recording: Recording) -> tuple[TimedText, ...]:
@@ -76,7 +70,7 @@ def _collect_responder_lines(recording: Recording) -> tuple[TimedText, ...]:
 @declare_judge(Says)
 def judge_says(criterion: Says, trial: TrialResult) -> Outcome:
     """Judge what the robot said, in order."""
-    return judge_sequence(criterion, trial.recording.spoken, _SPEECH_WORDING, trial.recording)
+    return judge_sequence(criterion, trial.recording.spoken, SPEECH, trial.recording)
 
 
 @declare_judge(Messages)
@@ -124,22 +118,23 @@ def judge_sequence(
 def _judge_last(
     criterion: TextSequence, lines: Sequence[TimedText], wording: TextWording, recording: Recording
 ) -> Outcome:
-    expected = describe_conditions(criterion)
-    if not lines:
-        return fail_with(
-            f"Expected the last text that {wording.who} {wording.past} to be {expected}, but it {wording.past} nothing."
-        )
-    last_line = lines[-1]
-    pose = get_pose_at(recording, last_line.t)
+    last_line = lines[-1] if lines else None
+    if last_line is None:
+        return fail_with(_describe_wrong_last(criterion, wording, wording.describe_actual(_NOTHING)))
+    last_text, pose = quote_text(last_line.text), get_pose_at(recording, last_line.t)
     if is_accepted_text(criterion, last_line.text):
-        return pass_with(
-            f"The last text that {wording.who} {wording.past} was {quote_text(last_line.text)}.", last_line.t, pose
-        )
-    return fail_with(
-        f"Expected the last text that {wording.who} {wording.past} to be {expected}, but it was "
-        f"{quote_text(last_line.text)}.",
-        last_line.t,
-        pose,
+        message = Sentence("The %(last_text)s was %(text)s.", last_text=wording.describe_last(), text=last_text)
+        return pass_with(message, last_line.t, pose)
+    actual = Sentence("it was %(text)s", text=last_text)
+    return fail_with(_describe_wrong_last(criterion, wording, actual), last_line.t, pose)
+
+
+def _describe_wrong_last(criterion: TextSequence, wording: TextWording, actual: str) -> str:
+    return Sentence(
+        "Expected the %(last_text)s to be %(expected)s, but %(actual)s.",
+        last_text=wording.describe_last(),
+        expected=describe_conditions(criterion),
+        actual=actual,
     )
 
 
@@ -161,33 +156,48 @@ def _judge_order(
             matched_lines.append(line)
         elif extra_line is None:
             extra_line = line
-    order = " in this order" if len(required_texts) > 1 else ""
-    expected = f"Expected {wording.who} to {wording.verb} {quote_list(required_texts)}{order}"
-    if criterion.only:
-        expected += " and nothing else"
-        conditions = describe_conditions(criterion)
-        expected += f" that {conditions.removeprefix(SOMETHING)}" if conditions.startswith(SOMETHING) else ""
+    expected = wording.describe_expected(_describe_required(criterion))
     extra_count = len(accepted_lines) - len(matched_lines) if criterion.only else 0
     score = Fraction(len(matched_lines), len(required_texts) + extra_count)
     if criterion.only and extra_line is not None:
-        message = f"{expected}, but it {wording.past} {quote_text(extra_line.text)} as well."
+        extra_text = Sentence("%(text)s as well", text=quote_text(extra_line.text))
+        actual = wording.describe_actual(extra_text)
+        message = Sentence("%(expected)s, but %(actual)s.", expected=expected, actual=actual)
         extra_pose, findings = get_pose_at(recording, extra_line.t), (ExtraText(extra_line.text),)
         return fail_with(message, extra_line.t, extra_pose, score, findings=findings), matched_lines
     if len(matched_lines) < len(required_texts):
-        missing_text = quote_text(required_texts[len(matched_lines)])
-        problem = (
-            _describe_actual(accepted_lines or lines, wording)
+        message = Sentence(
+            "%(expected)s, but %(actual)s (%(count)s of %(total)s found).",
+            expected=expected,
+            actual=_describe_actual(accepted_lines or lines, wording)
             if not matched_lines
-            else f"{missing_text} did not come after {quote_text(matched_lines[-1].text)}"
+            else Sentence(
+                "%(text)s did not come after %(previous)s",
+                text=quote_text(required_texts[len(matched_lines)]),
+                previous=quote_text(matched_lines[-1].text),
+            ),
+            count=len(matched_lines),
+            total=len(required_texts),
         )
         time = matched_lines[-1].t if matched_lines else None
         pose = get_pose_at(recording, time) if time is not None else None
-        return fail_with(
-            f"{expected}, but {problem} ({len(matched_lines)} of {len(required_texts)} found).", time, pose, score
-        ), matched_lines
+        return fail_with(message, time, pose, score), matched_lines
     last_line = matched_lines[-1]
-    message = f"{wording.who.capitalize()} {wording.past} {quote_list(required_texts)} in order."
-    return pass_with(message, last_line.t, get_pose_at(recording, last_line.t)), matched_lines
+    passed_text = wording.describe_passed(Sentence("%(texts)s in order", texts=quote_list(required_texts)))
+    return pass_with(passed_text, last_line.t, get_pose_at(recording, last_line.t)), matched_lines
+
+
+def _describe_required(criterion: TextSequence) -> str:
+    """Return the required texts in order, as a phrase."""
+    texts = quote_list(criterion.in_order)
+    if len(criterion.in_order) > 1:
+        texts = Sentence("%(texts)s in this order", texts=texts)
+    if not criterion.only:
+        return texts
+    clauses = describe_clauses(criterion)
+    if not clauses:
+        return Sentence("%(texts)s and nothing else", texts=texts)
+    return Sentence("%(texts)s and nothing else that %(clauses)s", texts=texts, clauses=clauses)
 
 
 def _is_distinct_match(criterion: TextSequence, text: str, expected: str) -> bool:
@@ -221,7 +231,7 @@ def _find_misplaced_lines(
         for line in distinct_lines
         if id(line) not in matched_ids
     )
-    description = f"such texts were {wording.past} {misplaced_count} times at the wrong point"
+    description = wording.describe_misplaced(misplaced_count)
     # A text that only contains "1" may be about anything.
     is_certain = is_any_counted or criterion.compare == "equals"
     return Strays(description, misplaced=misplaced_count) if is_certain else Strays(description, others=misplaced_count)
@@ -235,29 +245,27 @@ def _judge_count(
     recording: Recording,
 ) -> Outcome:
     minimum, maximum = _find_count_bounds(criterion)
-    conditions = describe_conditions(criterion) or "something"
     count = len(accepted_lines)
     last_line = accepted_lines[-1] if accepted_lines else None
     time = last_line.t if last_line else None
     pose = get_pose_at(recording, last_line.t) if last_line else None
     if count >= minimum and (maximum is None or count <= maximum):
         if last_line is None:
-            return pass_with(f"{wording.who.capitalize()} {wording.past} no forbidden text.")
-        count_clause = f" ({count} such texts)" if count > 1 else ""
-        return pass_with(
-            f"{wording.who.capitalize()} {wording.past} {quote_text(last_line.text)}{count_clause}.", time, pose
-        )
-    times = _format_times(minimum, maximum)
-    expected = f"Expected {wording.who} to {wording.verb} {conditions}{times}"
-    if count == 0:
-        return fail_with(f"{expected}, but {_describe_actual(lines, wording)}.")
+            return pass_with(wording.describe_passed(Sentence("no forbidden text")))
+        texts = quote_text(last_line.text)
+        if count > 1:
+            texts = Sentence("%(text)s (%(count)s such texts)", text=texts, count=count)
+        return pass_with(wording.describe_passed(texts), time, pose)
+    if last_line is None:
+        actual = _describe_actual(lines, wording)
+    else:
+        last_text = quote_text(last_line.text)
+        actual = wording.describe_actual(Sentence("%(count)s such, the last %(text)s", count=count, text=last_text))
+    conditions = describe_conditions(criterion) or Sentence("something")
+    expected = wording.describe_expected(_add_times(conditions, minimum, maximum))
     score = Fraction(count, minimum) if count < minimum else Fraction(maximum or 0, count)
-    return fail_with(
-        f"{expected}, but it {wording.past} {count} such, the last {quote_text(accepted_lines[-1].text)}.",
-        time,
-        pose,
-        score,
-    )
+    message = Sentence("%(expected)s, but %(actual)s.", expected=expected, actual=actual)
+    return fail_with(message, time, pose, score)
 
 
 def _find_extra_lines(
@@ -274,7 +282,8 @@ def _find_extra_lines(
     accepted_ids = set(map(id, accepted_lines))
     other_forms = [_remove_numbers(line.text) for line in lines if id(line) not in accepted_ids]
     extra_count = sum(form in accepted_forms for form in other_forms) + len(set(other_forms) - accepted_forms)
-    return Strays(f"it {wording.past} {extra_count} others as well", others=extra_count)
+    extras = Sentence("%(count)s others as well", count=extra_count)
+    return Strays(wording.describe_actual(extras), others=extra_count)
 
 
 def _remove_numbers(text: str) -> str:
@@ -290,20 +299,27 @@ def _find_count_bounds(criterion: TextSequence) -> tuple[int, int | None]:
     return criterion.at_least or 0, criterion.at_most
 
 
-def _format_times(minimum: int, maximum: int | None) -> str:
+def _add_times(texts: str, minimum: int, maximum: int | None) -> str:
+    """Return a phrase for texts with how often they are required."""
     if maximum is None:
-        return "" if minimum == 1 else f" at least {minimum} times"
+        return texts if minimum == 1 else Sentence("%(texts)s at least %(count)s times", texts=texts, count=minimum)
+    if maximum == minimum == 1:
+        return Sentence("%(texts)s exactly once", texts=texts)
     if maximum == minimum:
-        return " exactly once" if minimum == 1 else f" exactly {minimum} times"
-    return f" at most {maximum} times" if minimum == 0 else f" {minimum} to {maximum} times"
+        return Sentence("%(texts)s exactly %(count)s times", texts=texts, count=minimum)
+    if minimum == 0:
+        return Sentence("%(texts)s at most %(count)s times", texts=texts, count=maximum)
+    return Sentence("%(texts)s %(least)s to %(most)s times", texts=texts, least=minimum, most=maximum)
 
 
 def _describe_actual(lines: Sequence[TimedText], wording: TextWording) -> str:
     if not lines:
-        return f"it {wording.past} nothing"
+        return wording.describe_actual(_NOTHING)
+    last_text = quote_text(lines[-1].text)
     if len(lines) == 1:
-        return f"it {wording.past} {quote_text(lines[0].text)}"
-    return f"it {wording.past} {len(lines)} other texts, the last {quote_text(lines[-1].text)}"
+        return wording.describe_actual(last_text)
+    other_texts = Sentence("%(count)s other texts, the last %(text)s", count=len(lines), text=last_text)
+    return wording.describe_actual(other_texts)
 
 
 def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
@@ -312,15 +328,11 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
         sent_texts = [
             TimedText(message.t, message.text) for message in pair.recording.messages if message.sender == "robot"
         ]
-        wording = (
-            TextWording(pair.sender_name, f"tell {pair.receiver_name}", f"told {pair.receiver_name}")
-            if criterion.agents
-            else _SEND
-        )
+        wording = build_agent_wording(*criterion.agents) if criterion.agents else SENT_TEXT
         return judge_sequence(criterion, sent_texts, wording, recording)
     arrived_messages = [message for message in recording.messages if is_queued(message)]
     arrived_texts = [(message.delivered or 0.0, message.received) for message in arrived_messages]
-    outcome = judge_sequence(criterion, collect_queue_lines(criterion, arrived_texts), _RECEIVE, recording)
+    outcome = judge_sequence(criterion, collect_queue_lines(criterion, arrived_texts), RECEIVED_TEXT, recording)
     lost_answers = [
         message for message in recording.messages if message.sender == "responder" and is_lost_by_chance(message)
     ]
@@ -331,11 +343,11 @@ def _judge_texts(criterion: Messages, recording: Recording) -> Outcome:
         id(message): (message.delivered or message.t, message.text) for message in (*arrived_messages, *lost_answers)
     }
     excused_outcome = judge_sequence(
-        criterion, collect_queue_lines(criterion, answered_texts.values()), _RECEIVE, recording
+        criterion, collect_queue_lines(criterion, answered_texts.values()), RECEIVED_TEXT, recording
     )
     if excused_outcome.score <= outcome.score:
         return outcome
-    return replace(excused_outcome, message=f"{excused_outcome.message} {_EXCUSED}")
+    return replace(excused_outcome, message=join_sentences(excused_outcome.message, _EXCUSED))
 
 
 def _is_text_match(criterion: TextSequence, text: str, expected: str) -> bool:
