@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from service.grading.verdict_labels import VERDICT_LABELS
 from sim.recording import Verdict
+from sim.sentences import Sentence
 
 if TYPE_CHECKING:
     from service.grading.grade import Grade
@@ -192,7 +193,7 @@ def _collect_causes(submissions: Sequence[MarkedSubmission]) -> tuple[Cause, ...
             causes.append((VERDICT_LABELS[Verdict(submission.verdict)], ""))
         if submission.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT):
             lost_titles = [each.title for each in submission.criteria if each.marks < each.max_marks]
-            causes += [(f"lost marks for: {title}", title) for title in lost_titles]
+            causes += [(Sentence("lost marks for: %(title)s", title=title), title) for title in lost_titles]
         for cause in causes:
             students.setdefault(cause, []).append(submission.who)
     commonest = sorted(students.items(), key=lambda cause: (-len(cause[1]), cause[0]))

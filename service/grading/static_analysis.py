@@ -24,6 +24,7 @@ from service.grading.run_plan import RunPlan
 from sim.random_streams import RandomStream
 from sim.recording import Pose
 from sim.recording_values import tick_to_seconds
+from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import Functions, PythonCheck, SourceRules
 from submissions.submission import Part
@@ -131,7 +132,7 @@ def _read_source_answers(
     call_results = caller.call_functions(_READER, calls, 0, meter)
     fault = call_results.fault or call_results.returned[0].fault
     if fault is not None:
-        return SourceAnswers(error=f"it cannot be analysed ({describe_fault(fault)})")
+        return SourceAnswers(error=Sentence("it cannot be analysed (%(fault)s)", fault=describe_fault(fault)))
     return SourceAnswers.read(call_results.returned[0].value, criterion)
 
 

@@ -9,9 +9,11 @@ from fractions import Fraction
 
 from service.grading.grade import CriterionResult
 from service.grading.judging.accuracy_curves import compute_curves
+from service.grading.judging.joined_texts import join_with_commas
 from service.grading.judging.judge_declaration import Case, IndexedTrials, declare_case_judge, has_hidden
 from service.grading.judging.outcome import compute_accuracy_share, compute_steps_share, round_to_steps
 from service.grading.judging.recognition import ClassificationResult, build_recognition_result, classify, judge_pooled
+from sim.sentences import Sentence
 from submissions.criteria.classification import Classification
 
 
@@ -45,7 +47,11 @@ def _compute_share(criterion: Classification, classification: ClassificationResu
 
 def _describe_mark_conditions(criterion: Classification) -> str:
     if criterion.at_least is not None:
-        return f" Full marks need an accuracy of {criterion.at_least:g}."
+        return Sentence("Full marks need an accuracy of %(accuracy)g.", accuracy=criterion.at_least)
     if criterion.steps:
-        return " Marks: " + ", ".join(f"{marks:g} from {accuracy:g}" for accuracy, marks in criterion.steps) + "."
+        steps = [
+            Sentence("%(marks)g from %(accuracy)g", marks=marks, accuracy=accuracy)
+            for accuracy, marks in criterion.steps
+        ]
+        return Sentence("Marks: %(steps)s.", steps=join_with_commas(steps))
     return ""

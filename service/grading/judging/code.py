@@ -6,7 +6,7 @@ Sources are read and functions called inside the sandbox. The results are data, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from typing import Any
@@ -22,12 +22,14 @@ from service.grading.findings import (
 )
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
+from service.grading.judging.joined_texts import join_with_or, join_with_semicolons
 from service.grading.judging.judge_declaration import Case, declare_case_judge, judge_by_trial, judge_once
 from service.grading.judging.message_parts import describe_fault, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with, round_to_steps
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from sim.errors import AssignmentError
-from submissions.criteria.code import CONSTRUCTS, ExpectedCall, Functions, PythonCheck, SourceRules, parse_flag_texts
+from sim.sentences import Sentence, join_sentences
+from submissions.criteria.code import ExpectedCall, Functions, PythonCheck, SourceRules, parse_flag_texts
 from submissions.magics import Flags
 
 #: The largest number of problems to report, so that the first is easy to see.
@@ -60,45 +62,70 @@ def judge_source(
     criterion: SourceRules, answers: SourceAnswers | None, flags: Flags, trials: Sequence[TrialResult] = ()
 ) -> Outcome:
     """Judge the source. ``trials`` are the runs of the program."""
-    part_name = "your program" if criterion.part == "program" else "your responder"
+    part = Sentence("your program") if criterion.part == "program" else Sentence("your responder")
     if answers is None:
-        return fail_with(f"Expected {part_name} to be submitted, but it was not.")
+        return fail_with(Sentence("Expected %(part)s to be submitted, but it was not.", part=part))
     if answers.error:
-        return fail_with(f"Expected {part_name} to be readable as Python, but: {answers.error}.")
-    problems: list[str] = []
+        return fail_with(
+            Sentence("Expected %(part)s to be readable as Python, but: %(error)s.", part=part, error=answers.error)
+        )
+    missing_flags = _list_missing_flags(criterion, flags)
+    problems = [
+        *_describe_source_problems(criterion, answers, part, trials),
+        *(
+            Sentence("Expected the magic line of %(part)s to have %(flag)s, but it does not.", part=part, flag=flag)
+            for flag in missing_flags
+            if flag
+        ),
+    ]
+    for_staff = _build_staff_note(criterion, answers)
+    if not problems:
+        return pass_with(Sentence("The code of %(part)s is as expected.", part=part), for_staff=for_staff)
+    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(missing_flags)
+    message = join_sentences(*problems[:_MAX_LISTED])
+    score = Fraction(count - len(problems), count)
+    letters = tuple(flag[1:] for flag in missing_flags if len(flag) == 2)
+    return fail_with(message, score=score, for_staff=for_staff, findings=(MissingSwitches(letters),) if letters else ())
+
+
+def _describe_source_problems(
+    criterion: SourceRules, answers: SourceAnswers, part: str, trials: Sequence[TrialResult]
+) -> Iterator[str]:
+    """Yield a sentence for each rule that the source violates."""
     for rule, position in zip(criterion.uses, answers.uses, strict=True):
         if position is None:
-            problems.append(
-                f"Expected {part_name} to use {_describe_rule(rule)}, but it does not, or only in code that is not run"
+            yield Sentence(
+                "Expected %(part)s to use %(rule)s, but it does not, or only in code that is not run.",
+                part=part,
+                rule=_describe_rule(rule),
             )
     for rule, position in zip(criterion.avoids, answers.avoids, strict=True):
         finding = (
-            f"{position} uses it"
+            Sentence("%(place)s uses it", place=position.describe())
             if position is not None
             else _describe_unseen_speech(rule, answers, trials) or answers.unread
         )
         if finding:
-            problems.append(f"Expected {part_name} not to use {_describe_rule(rule)}, but {finding}")
+            yield Sentence(
+                "Expected %(part)s not to use %(rule)s, but %(finding)s.",
+                part=part,
+                rule=_describe_rule(rule),
+                finding=finding,
+            )
     for rule, position in zip(criterion.in_loop, answers.in_loop, strict=True):
         if position is None:
-            problems.append(
-                f"Expected {part_name} to call {rule} inside a loop, but it does not, or only in code that is not run"
+            yield Sentence(
+                "Expected %(part)s to call %(rule)s inside a loop, but it does not, or only in code that is not run.",
+                part=part,
+                rule=rule,
             )
     for rule, position in zip(criterion.defines, answers.defines, strict=True):
         if position is None:
-            problems.append(f"Expected {part_name} to define a function {rule}, but it does not")
-    missing_flags = _list_missing_flags(criterion, flags)
-    problems += [
-        f"Expected the magic line of {part_name} to have {told}, but it does not" for told in missing_flags if told
-    ]
-    for_staff = _build_staff_note(criterion, answers)
-    if not problems:
-        return pass_with(f"The code of {part_name} is as expected.", for_staff=for_staff)
-    count = len(criterion.uses + criterion.avoids + criterion.in_loop + criterion.defines) + len(missing_flags)
-    message = f"{'. '.join(problems[:_MAX_LISTED])}."
-    score = Fraction(count - len(problems), count)
-    letters = tuple(flag[1:] for flag in missing_flags if len(flag) == 2)
-    return fail_with(message, score=score, for_staff=for_staff, findings=(MissingSwitches(letters),) if letters else ())
+            yield Sentence(
+                "Expected %(part)s to define a function %(rule)s, but it does not.",
+                part=part,
+                rule=rule,
+            )
 
 
 def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[TrialResult]) -> str:
@@ -111,14 +138,14 @@ def _describe_unseen_speech(rule: str, answers: SourceAnswers, trials: Sequence[
     if not rule.endswith("()") or not any(matches) or is_shown:
         return ""
     has_spoken = any(trial.recording.spoken for trial in trials if trial.visibility == "visible")
-    return "the robot spoke during the run" if has_spoken else ""
+    return Sentence("the robot spoke during the run") if has_spoken else ""
 
 
 def _build_staff_note(criterion: SourceRules, answers: SourceAnswers) -> str:
     """Return what staff should check for avoided constructs, because the source does not show all it can do."""
     if not criterion.avoids or not answers.doubts:
         return ""
-    return f"The code may do more than it shows: {'; '.join(answers.doubts)}."
+    return Sentence("The code may do more than it shows: %(doubts)s.", doubts=join_with_semicolons(answers.doubts))
 
 
 def _list_missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
@@ -134,9 +161,7 @@ def _list_missing_flags(criterion: SourceRules, flags: Flags) -> list[str]:
 
 
 def _describe_rule(rule: str) -> str:
-    if rule not in CONSTRUCTS:
-        return rule
-    return f"a {rule} loop" if rule in ("for", "while") else rule
+    return Sentence("a %(keyword)s loop", keyword=rule) if rule in ("for", "while") else rule
 
 
 _MAX_MESSAGE_LENGTH = 500
@@ -153,10 +178,10 @@ def list_calls(criterion: Functions) -> tuple[FunctionCall, ...]:
 
 def _judge_calls(criterion: Functions, results: CallResults | None) -> Outcome:
     if results is None:
-        return fail_with("Expected a responder to be submitted, but it was not.")
+        return fail_with(Sentence("Expected a responder to be submitted, but it was not."))
     if results.fault is not None:
         return fail_with(
-            f"Expected the responder to be loaded, but: {describe_fault(results.fault)}.",
+            Sentence("Expected the responder to be loaded, but: %(fault)s.", fault=describe_fault(results.fault)),
             findings=(UnloadedResponder(results.fault),),
         )
     scores: list[Fraction] = []
@@ -167,9 +192,16 @@ def _judge_calls(criterion: Functions, results: CallResults | None) -> Outcome:
         score, description, value = _compare_call(criterion, call, call_result)
         scores.append(score)
         if score < min_score:
-            problem = f"Expected {_format_call(criterion, call)} to return {_format_expected(call)}, but {description}"
+            problem = Sentence(
+                "Expected %(call)s to return %(value)s, but %(actual)s",
+                call=_format_call(criterion, call),
+                value=_format_expected(call),
+                actual=description,
+            )
             if call.hidden:
-                for_staff = for_staff or f"The first hidden call with a wrong result: {problem}."
+                for_staff = for_staff or Sentence(
+                    "The first hidden call with a wrong result: %(problem)s.", problem=problem
+                )
             elif not first_problem:
                 name, first_problem = call.function or criterion.function, problem
                 expected = None if call.one_of else call.returns
@@ -187,15 +219,34 @@ def _combine_call_scores(
     share = sum(scores, Fraction(0)) / len(scores)
     measures = (Measure("right", float(share)),)
     if not problem or (criterion.table and share >= Fraction(str(criterion.at_least))):
-        summary = f"{float(share):.0%} correct" if criterion.each else f"{len(scores)} of {len(scores)} calls correct"
-        summary = f"at least {criterion.at_least:.0%} of {len(scores)} calls correct" if criterion.table else summary
-        return pass_with(
-            f"The functions returned the expected values: {summary}.", measures=measures, for_staff=for_staff
-        )
+        return pass_with(_describe_right_calls(criterion, scores, share), measures=measures, for_staff=for_staff)
     right_count = sum(score == 1 for score in scores)
-    tally = f" ({right_count} of {len(scores)} calls correct)" if len(scores) > 1 and not criterion.table else ""
     score = round_to_steps(share) if criterion.table else share
-    return fail_with(f"{problem}{tally}.", score=score, measures=measures, for_staff=for_staff, findings=findings)
+    message = (
+        Sentence(
+            "%(problem)s (%(right)s of %(count)s calls correct).", problem=problem, right=right_count, count=len(scores)
+        )
+        if len(scores) > 1 and not criterion.table
+        else Sentence("%(problem)s.", problem=problem)
+    )
+    return fail_with(message, score=score, measures=measures, for_staff=for_staff, findings=findings)
+
+
+def _describe_right_calls(criterion: Functions, scores: Sequence[Fraction], share: Fraction) -> str:
+    """Return the sentence on calls that passed. ``share`` is the mean of the scores."""
+    if criterion.table:
+        return Sentence(
+            "The functions returned the expected values: at least %(percent).0f%% of %(count)s calls correct.",
+            percent=100 * criterion.at_least,
+            count=len(scores),
+        )
+    if criterion.each:
+        return Sentence(
+            "The functions returned the expected values: %(percent).0f%% correct.", percent=100 * float(share)
+        )
+    return Sentence(
+        "The functions returned the expected values: %(count)s of %(count)s calls correct.", count=len(scores)
+    )
 
 
 def _describe_hidden_failures(
@@ -207,17 +258,26 @@ def _describe_hidden_failures(
     if [fault.message for fault in faults] == [
         describe_missing_function(call.function or criterion.function) for call in calls
     ]:
-        return f"Expected all functions to exist, but {faults[0].message}", (UnloadedResponder(faults[0]),)
+        problem = Sentence("Expected all functions to exist, but %(fault)s", fault=faults[0].message)
+        return problem, (UnloadedResponder(faults[0]),)
     hidden_scores = [score for call, score in zip(calls, scores, strict=True) if call.hidden]
     if criterion.table:
         share = round_to_steps(sum(scores, Fraction(0)) / len(scores))
-        expectation = f"Expected {criterion.function} to be correct in {criterion.at_least:.0%} of {len(scores)} calls"
-        return f"{expectation}, but it was correct in about {float(share):.0%}", ()
-    right_count = sum(score >= min_score for score in hidden_scores)
-    return (
-        f"Expected the right values in all {len(hidden_scores)} hidden calls as well, but {right_count} of them were "
-        "right"
-    ), (WrongHiddenCalls(),)
+        problem = Sentence(
+            "Expected %(function)s to be correct in %(least).0f%% of %(count)s calls, but it was correct in about "
+            "%(percent).0f%%",
+            function=criterion.function,
+            least=100 * criterion.at_least,
+            count=len(scores),
+            percent=100 * float(share),
+        )
+        return problem, ()
+    problem = Sentence(
+        "Expected the right values in all %(count)s hidden calls as well, but %(right)s of them were right",
+        count=len(hidden_scores),
+        right=sum(score >= min_score for score in hidden_scores),
+    )
+    return problem, (WrongHiddenCalls(),)
 
 
 def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outcome:
@@ -236,11 +296,11 @@ def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outc
     if not isinstance(result, dict) or not isinstance(result.get("passed"), bool):
         raise AssignmentError(f'{problem} with "passed".')
     score, measures = result.get("score", 0), result.get("measures", {})
-    message = result.get("message") or ("As expected." if result["passed"] else "Not as expected.")
+    message = result.get("message") or ""
     numbers = [score, *measures.values()] if isinstance(measures, dict) else [None]
     if not isinstance(message, str) or not all(map(_is_number, numbers)):
         raise AssignmentError(f"{problem}: message is a text, score a number, measures maps names to numbers.")
-    message = " ".join(message.split())[:_MAX_MESSAGE_LENGTH]
+    message = " ".join(message.split())[:_MAX_MESSAGE_LENGTH] if message else _describe_result(result["passed"])
     kept_measures = tuple(
         Measure(str(name)[:60], float(value)) for name, value in list(measures.items())[:_MAX_MEASURES]
     )
@@ -249,17 +309,25 @@ def _judge_check_result(criterion: PythonCheck, call_result: CallResult) -> Outc
     return fail_with(message, score=Fraction(str(score)), measures=kept_measures)
 
 
+def _describe_result(passed: bool) -> str:
+    return Sentence("As expected.") if passed else Sentence("Not as expected.")
+
+
 def _compare_call(criterion: Functions, call: ExpectedCall, call_result: CallResult) -> tuple[Fraction, str, Any]:
     """Return the correct fraction of a call, a description of what happened, and the compared value or MISSING."""
     if call_result.fault is not None:
-        return Fraction(0), f"it did not: {describe_fault(call_result.fault)}", MISSING
+        description = Sentence("it did not: %(fault)s", fault=describe_fault(call_result.fault))
+        return Fraction(0), description, MISSING
     value = call_result.value
     if criterion.path is not None:
         value = find_at_path(parse_json_answer(value), criterion.path) if isinstance(value, str) else MISSING
         if value is MISSING:
-            description = f"there is nothing at {criterion.path} in {quote_text(as_text(call_result.value))}"
+            answer_text = quote_text(as_text(call_result.value))
+            description = Sentence(
+                "there is nothing at %(path)s in %(answer)s", path=criterion.path, answer=answer_text
+            )
             return Fraction(0), description, MISSING
-    description = f"it returned {_format_value(value)}"
+    description = Sentence("it returned %(value)s", value=_format_value(value))
     if criterion.each:
         return _compute_correct_share(criterion, call.returns, value), description, value
     allowed_values = call.one_of or (call.returns,)
@@ -314,7 +382,7 @@ def _format_call(criterion: Functions, call: ExpectedCall) -> str:
 
 
 def _format_expected(call: ExpectedCall) -> str:
-    return " or ".join(map(_format_value, call.one_of or (call.returns,)))
+    return join_with_or([_format_value(value) for value in call.one_of or (call.returns,)])
 
 
 def _format_value(value: Any) -> str:

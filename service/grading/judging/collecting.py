@@ -13,13 +13,16 @@ from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import locate_footprint, locate_part
+from service.grading.judging.joined_texts import join_with_commas
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.label_patches import GREYS, decode_label
 from service.grading.judging.message_parts import quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.language import translatable
 from sim.floors import list_label_names
 from sim.recording import Image, Recording
 from sim.recording_values import get_pose_after, rebuild_floor, tick_to_seconds
+from sim.sentences import Sentence
 from submissions.criteria.collecting import Collects
 
 _REMAINDER_SHARE = Fraction(1, 2)
@@ -67,10 +70,17 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     checks = list(_build_checks(criterion, classes, counts, pairs, len(usable), repeated_count))
     problem = next((words for holds, words in checks if not holds), None)
     if problem is None:
-        counts_text = ", ".join(f"{counts[label]} of {quote_text(label)}" for label in classes)
+        class_counts = [
+            Sentence("%(count)s of %(label)s", count=counts[label], label=quote_text(label)) for label in classes
+        ]
         return pass_with(
-            f"Of {len(pairs)} pairs of images {len(usable)} are usable, {repeated_count} repeat an earlier one: "
-            f"{counts_text}.",
+            Sentence(
+                "Of %(pairs)s pairs of images %(usable)s are usable, %(repeated)s repeat an earlier one: %(counts)s.",
+                pairs=len(pairs),
+                usable=len(usable),
+                repeated=repeated_count,
+                counts=join_with_commas(class_counts),
+            ),
             last_image.t if last_image else None,
             last_image.pose if last_image else None,
             measures,
@@ -78,7 +88,7 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     if score == 1:
         score = 1 - _REMAINDER_SHARE * Fraction(sum(not holds for holds, _ in checks), len(checks))
     return fail_with(
-        f"{problem}.", last_image.t if last_image else None, last_image.pose if last_image else None, score, measures
+        problem, last_image.t if last_image else None, last_image.pose if last_image else None, score, measures
     )
 
 
@@ -140,29 +150,65 @@ def _build_checks(
 ) -> Iterator[tuple[bool, str]]:
     """Yield each condition with the message for the case that it fails."""
     command = "image_data both" if criterion.source == "log" else "IMG_DATA"
-    yield bool(pairs), f"Expected pairs of images to be collected, but there are none ({command})"
+    yield (
+        bool(pairs),
+        Sentence("Expected pairs of images to be collected, but there are none (%(command)s).", command=command),
+    )
     rarest = min(classes, key=lambda label: counts[label], default="")
     commonest = max(classes, key=lambda label: counts[label], default="")
-    images = "image" if criterion.each == 1 else "images"
+    template = (
+        translatable(
+            "Expected at least 1 different usable image of each class, but there are %(count)s of %(label)s; "
+            "%(usable)s of %(pairs)s pairs are usable, with a pattern under the left sensor and its label patch under "
+            "the right one."
+        )
+        if criterion.each == 1
+        else translatable(
+            "Expected at least %(least)s different usable images of each class, but there are %(count)s of %(label)s; "
+            "%(usable)s of %(pairs)s pairs are usable, with a pattern under the left sensor and its label patch under "
+            "the right one."
+        )
+    )
     yield (
         bool(classes) and counts[rarest] >= criterion.each,
-        f"Expected at least {criterion.each} different usable {images} of each class, but there are {counts[rarest]} "
-        f"of {quote_text(rarest)}; {usable} of {len(pairs)} pairs are usable, with a pattern under the left sensor "
-        "and its label patch under the right one",
+        Sentence(
+            template,
+            least=criterion.each,
+            count=counts[rarest],
+            label=quote_text(rarest),
+            usable=usable,
+            pairs=len(pairs),
+        ),
     )
     if criterion.balance is not None:
         yield (
             counts[rarest] >= criterion.balance * counts[commonest],
-            f"Expected the rarest class to have at least {criterion.balance:.0%} of the images of the commonest, but "
-            f"there are {counts[rarest]} of {quote_text(rarest)} and {counts[commonest]} of {quote_text(commonest)}",
+            Sentence(
+                "Expected the rarest class to have at least %(percent).0f%% of the images of the commonest, but there "
+                "are %(count)s of %(label)s and %(other_count)s of %(other_label)s.",
+                percent=100 * criterion.balance,
+                count=counts[rarest],
+                label=quote_text(rarest),
+                other_count=counts[commonest],
+                other_label=quote_text(commonest),
+            ),
         )
     yield (
         repeated_count <= criterion.most_duplicates * len(pairs),
-        f"Expected at most {criterion.most_duplicates:.0%} of the images to repeat an earlier one, but "
-        f"{repeated_count} of {len(pairs)} do",
+        Sentence(
+            "Expected at most %(percent).0f%% of the images to repeat an earlier one, but %(count)s of %(pairs)s do.",
+            percent=100 * criterion.most_duplicates,
+            count=repeated_count,
+            pairs=len(pairs),
+        ),
     )
     useless = len(pairs) - usable
     yield (
         useless <= criterion.most_unusable * len(pairs),
-        f"Expected at most {criterion.most_unusable:.0%} of pairs to be unusable, but {useless} of {len(pairs)} are",
+        Sentence(
+            "Expected at most %(percent).0f%% of pairs to be unusable, but %(count)s of %(pairs)s are.",
+            percent=100 * criterion.most_unusable,
+            count=useless,
+            pairs=len(pairs),
+        ),
     )

@@ -11,6 +11,7 @@ from typing import Literal
 from responders.faults import is_wrong_return
 from service.grading.judging.answers import Answers
 from sim.recording import Image, Message, Recording, TimedText
+from sim.sentences import Sentence
 from submissions.criteria.recognition import Recognition
 
 ReplyStatus = Literal["answered", "late", "malformed", "unanswered"]
@@ -44,7 +45,7 @@ def find_reply(recording: Recording, answers: Answers, number: int) -> Reply:
     text = message.text
     duplicates = len(arrived_answers) - 1
     if status == "malformed":
-        return Reply(status, None, "the answer begins with JSON:: but is not JSON", duplicates)
+        return Reply(status, None, Sentence("the answer begins with JSON:: but is not JSON"), duplicates)
     return Reply(status, text, "", duplicates)
 
 
@@ -67,10 +68,10 @@ def _build_missing_reply(
 ) -> Reply:
     """Return the reply if nothing arrived: image or answer was lost, the answer was not a text, or none was given."""
     if received_answers:
-        return Reply("unanswered", None, "the answer was lost on its way")
+        return Reply("unanswered", None, Sentence("the answer was lost on its way"))
     question_message = recording.messages[question] if question < len(recording.messages) else None
     if question_message is not None and question_message.note == "lost":
-        return Reply("unanswered", None, "the image was lost on its way")
+        return Reply("unanswered", None, Sentence("the image was lost on its way"))
     fault = answers.find_fault_after(question)
     if fault is not None and is_wrong_return(fault):
         return Reply("malformed", None, answers.describe_silence(question))
@@ -82,13 +83,16 @@ def collect_replies(criterion: Recognition, recording: Recording) -> list[Reply]
     if criterion.answer_from == "reply":
         answers = Answers(recording)
         return [find_reply(recording, answers, number) for number in range(len(recording.images))]
-    verb = "said" if criterion.answer_from == "speech" else "printed"
+    silence = (
+        Sentence("the robot said nothing after the image")
+        if criterion.answer_from == "speech"
+        else Sentence("the robot printed nothing after the image")
+    )
     replies = []
     for image in recording.images:
         answer_lines = _list_lines_between(recording, image, criterion.answer_from == "speech")
         text = " | ".join(line.text for line in answer_lines)
-        missing_reply = Reply("unanswered", None, f"the robot {verb} nothing after the image")
-        replies.append(Reply("answered", text, "") if answer_lines else missing_reply)
+        replies.append(Reply("answered", text, "") if answer_lines else Reply("unanswered", None, silence))
     return replies
 
 

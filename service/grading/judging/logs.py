@@ -6,8 +6,9 @@ Images and readings come from the simulator's recording. Values are those the pr
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from types import MappingProxyType
 
 import numpy as np
 
@@ -18,14 +19,27 @@ from service.grading.judging.label_patches import GREYS, decode_label
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.sensor_readings import match_readings
 from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
+from service.language import translatable
 from sim.camera import HEIGHT, WIDTH, build_sensor_mask
 from sim.floors import Floor
 from sim.light_sensors import Footprint
 from sim.recording import DatalogEntry, Image, Recording
 from sim.recording_values import get_pose_after, get_pose_at, rebuild_floor, tick_to_seconds
-from submissions.criteria.logs import Datalog, ImageLog
+from sim.sentences import Sentence
+from submissions.criteria.logs import Datalog, ImageLog, Instrument
 
 Check = tuple[Fraction, str]  # the fraction reached, and the message if it is below 1
+
+_READINGS: Mapping[Instrument, Sentence] = MappingProxyType(
+    {
+        "left light": Sentence("readings of the left light sensor"),
+        "right light": Sentence("readings of the right light sensor"),
+        "ultrasonic": Sentence("readings of the ultrasonic sensor"),
+        "gyro": Sentence("readings of the gyro"),
+        "left wheel": Sentence("readings of the left wheel"),
+        "right wheel": Sentence("readings of the right wheel"),
+    }
+)
 
 
 @declare_judge(Datalog)
@@ -41,40 +55,49 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     measures = (Measure("samples", float(len(values))), *_measure_extremes(values))
     if criterion.measured is not None:
         measures += (Measure("made up", float(invented_count)),)
+    readings = _READINGS[criterion.measured] if criterion.measured is not None else ""
     if logged_samples and not values:
-        return fail_with(
-            f"Expected {name} to be readings of {_describe_instrument(criterion)}, but all {len(logged_samples)} "
-            "samples are made up: none matches the reading at the time of printing.",
-            measures=measures,
+        message = Sentence(
+            "Expected %(name)s to be %(readings)s, but all %(count)s samples are made up: none matches the reading at "
+            "the time of printing.",
+            name=name,
+            readings=readings,
+            count=len(logged_samples),
         )
+        return fail_with(message, measures=measures)
     if not values and (criterion.at_least or criterion.plateaus or criterion.between or criterion.covers):
         return fail_with(
-            f'Expected the program to log {name}, but the datalog has none: no line like "{name}: 42" was printed.'
+            Sentence(
+                'Expected the program to log %(name)s, but the datalog has none: no line like "%(name)s: 42" was '
+                "printed.",
+                name=name,
+            )
         )
     checks = _check_datalog(criterion, samples, recording)
     if criterion.plateaus:
         checks.append(_check_plateaus(criterion, values))
     problem = next((words for reached, words in checks if reached < 1), None)
-    remark = (
-        f"; {invented_count} of {len(logged_samples)} are made up, not readings of {_describe_instrument(criterion)}"
+    summary = problem or Sentence(
+        "The program logged %(count)s samples of %(name)s as expected", count=len(values), name=name
+    )
+    message = (
+        Sentence(
+            "%(summary)s; %(count)s of %(total)s are made up, not %(readings)s.",
+            summary=summary,
+            count=invented_count,
+            total=len(logged_samples),
+            readings=readings,
+        )
         if invented_count
-        else ""
+        else Sentence("%(summary)s.", summary=summary)
     )
     if problem is None:
-        outcome = pass_with(
-            f"The program logged {len(values)} samples of {name} as expected{remark}.", measures=measures
-        )
+        outcome = pass_with(message, measures=measures)
     else:
         score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
-        outcome = fail_with(f"{problem}{remark}.", score=score, measures=measures)
-    return apply_stray_penalty(
-        outcome, criterion, max(len(samples), 1), Strays("so much of the log is made up", invented_count)
-    )
-
-
-def _describe_instrument(criterion: Datalog) -> str:
-    name = criterion.measured or ""
-    return f"the {name} sensor" if name in ("left light", "right light", "ultrasonic") else f"the {name}"
+        outcome = fail_with(message, score=score, measures=measures)
+    strays = Strays(Sentence("so much of the log is made up"), invented_count)
+    return apply_stray_penalty(outcome, criterion, max(len(samples), 1), strays)
 
 
 def _filter_measured_samples(
@@ -88,12 +111,23 @@ def _filter_measured_samples(
     return [datum for datum, true in zip(logged_samples, is_read.tolist(), strict=True) if true]
 
 
-def _format_image_count(count: int) -> str:
-    return f"{count or 'no'} image{'' if count == 1 else 's'}"
+def _describe_images(count: int, side: str, is_minimum: bool) -> str:
+    """Return the required images of a light sensor."""
+    if count == 0:
+        images = Sentence("no images")
+    else:
+        images = Sentence("1 image") if count == 1 else Sentence("%(count)s images", count=count)
+    if is_minimum:
+        images = Sentence("at least %(images)s", images=images)
+    if side == "left":
+        return Sentence("%(images)s of the left sensor", images=images)
+    return Sentence("%(images)s of the right sensor", images=images)
 
 
-def _format_existing_count(count: int) -> str:
-    return f"there {'is' if count == 1 else 'are'} {count or 'none'}"
+def _describe_existing_count(count: int) -> str:
+    if count == 0:
+        return Sentence("there are none")
+    return Sentence("there is 1") if count == 1 else Sentence("there are %(count)s", count=count)
 
 
 @declare_judge(ImageLog)
@@ -107,9 +141,10 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         ("right", criterion.right, criterion.right_at_least),
     ):
         actual_count = sum(entry[0] == side for entry in log)
-        expectation = f"at least {_format_image_count(minimum)}" if count is None else _format_image_count(count)
-        message = (
-            f"Expected {expectation} of the {side} sensor to be logged, but {_format_existing_count(actual_count)}"
+        message = Sentence(
+            "Expected %(images)s to be logged, but %(actual)s.",
+            images=_describe_images(minimum if count is None else count, side, count is None),
+            actual=_describe_existing_count(actual_count),
         )
         if count is not None or minimum:
             share = (
@@ -122,16 +157,16 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         checks.append(
             (
                 Fraction(is_alternating),
-                "Expected left and right images to alternate, but they did not (image_data both)",
+                Sentence("Expected left and right images to alternate, but they did not (image_data both)."),
             )
         )
     if criterion.at_start:
         moved_image = next((entry for entry in log if not _is_start_image(entry, recording, trial.light_noise)), None)
-        position_text = _describe_position(recording, moved_image[2]) if moved_image else ""
+        problem_text = _describe_position(recording, moved_image[2]) if moved_image else Sentence("there is none")
         checks.append(
             (
                 Fraction(bool(log) and moved_image is None),
-                f"Expected every image to be taken at the start pose, but {position_text or 'there is none'}",
+                Sentence("Expected every image to be taken at the start pose, but %(problem)s.", problem=problem_text),
             )
         )
     if criterion.uniform is not None:
@@ -142,20 +177,30 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
         checks.append(
             (
                 Fraction(is_uniform),
-                f"Expected every image of the {criterion.uniform} sensor to be of one colour, but one is not "
-                "or shows no label's patch",
+                Sentence(
+                    "Expected every image of the left sensor to be of one colour, but one is not or shows no label's "
+                    "patch."
+                )
+                if criterion.uniform == "left"
+                else Sentence(
+                    "Expected every image of the right sensor to be of one colour, but one is not or shows no label's "
+                    "patch."
+                ),
             )
         )
     measures = (Measure("images", float(len(log))),)
     problem = next((words for reached, words in checks if reached < 1), None)
     if problem is None:
-        return pass_with(
-            f"The program logged {len(log)} {'image' if len(log) == 1 else 'images'} as expected.", measures=measures
+        message = (
+            Sentence("The program logged 1 image as expected.")
+            if len(log) == 1
+            else Sentence("The program logged %(count)s images as expected.", count=len(log))
         )
+        return pass_with(message, measures=measures)
     last_time = tick_to_seconds(recording, log[-1][2]) if log else None
     pose = None if last_time is None else get_pose_at(recording, last_time)
     score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
-    return fail_with(f"{problem}.", last_time, pose, score if log else Fraction(0), measures)
+    return fail_with(problem, last_time, pose, score if log else Fraction(0), measures)
 
 
 def _measure_extremes(values: Sequence[float]) -> tuple[Measure, ...]:
@@ -169,44 +214,76 @@ def _check_datalog(criterion: Datalog, samples: Sequence[DatalogEntry], recordin
     values = [datum.value for datum in samples]
     checks: list[Check] = []
     if criterion.at_least > 1:
-        message = f"Expected at least {criterion.at_least} samples of {name}, but there are {count}"
+        message = Sentence(
+            "Expected at least %(least)s samples of %(name)s, but there are %(count)s",
+            least=criterion.at_least,
+            name=name,
+            count=count,
+        )
         checks.append((min(Fraction(count, criterion.at_least), Fraction(1)), message))
     if criterion.at_most is not None:
-        max_count = criterion.at_most
-        checks.append(
-            (Fraction(count <= max_count), f"Expected at most {max_count} samples of {name}, but there are {count}")
+        message = Sentence(
+            "Expected at most %(most)s samples of %(name)s, but there are %(count)s",
+            most=criterion.at_most,
+            name=name,
+            count=count,
         )
+        checks.append((Fraction(count <= criterion.at_most), message))
     if criterion.timed:
         timed_share = Fraction(sum(datum.simtime is not None for datum in samples), max(count, 1))
-        checks.append(
-            (timed_share, f'Expected every sample of {name} to have its time ("{name}: 42 1.5"), but some have none')
+        message = Sentence(
+            'Expected every sample of %(name)s to have its time ("%(name)s: 42 1.5"), but some have none', name=name
         )
+        checks.append((timed_share, message))
     if criterion.between is not None:
         minimum, maximum = criterion.between
         strays = [value for value in values if not minimum <= value <= maximum]
-        stray_text = f"{strays[0]:g}" if strays else ""
-        message = f"Expected {name} to stay between {minimum:g} and {maximum:g}, but it was {stray_text} once"
+        message = Sentence(
+            "Expected %(name)s to stay between %(least)g and %(most)g, but it was %(value)s once",
+            name=name,
+            least=minimum,
+            most=maximum,
+            value=f"{strays[0]:g}" if strays else "",
+        )
         checks.append((Fraction(count - len(strays), max(count, 1)), message))
     if criterion.covers is not None and values:
         low, high = criterion.covers
-        message = f"Expected {name} to go from {low:g} to {high:g}, but it went from {min(values):g} to {max(values):g}"
+        message = Sentence(
+            "Expected %(name)s to go from %(low)g to %(high)g, but it went from %(least)g to %(most)g",
+            name=name,
+            low=low,
+            high=high,
+            least=min(values),
+            most=max(values),
+        )
         checks.append((Fraction(min(values) <= low and max(values) >= high), message))
     if criterion.dips_below is not None:
         other_values = [datum.value for datum in recording.datalog if datum.name == criterion.dips_below]
         is_deeper = bool(other_values) and bool(values) and min(values) < min(other_values)
-        message = f"Expected the lowest {name} to be below the lowest {criterion.dips_below}, but it is not"
+        message = Sentence(
+            "Expected the lowest %(name)s to be below the lowest %(other)s, but it is not",
+            name=name,
+            other=criterion.dips_below,
+        )
         checks.append((Fraction(is_deeper), message))
     return checks
 
 
 def _check_plateaus(criterion: Datalog, values: Sequence[float]) -> Check:
     plateau_count, count = _count_ordered_plateaus(criterion, values), len(criterion.plateaus)
-    series = ", ".join(f"{value:g}" for value in criterion.plateaus)
-    order_clause = f"after {criterion.plateaus[plateau_count - 1]:g} " if plateau_count else ""
-    missing_plateau = criterion.plateaus[min(plateau_count, count - 1)]
-    message = (
-        f"Expected {criterion.series} to stay at {series} in this order, "
-        f"but {order_clause}it never stayed at {missing_plateau:g}"
+    template = (
+        translatable(
+            "Expected %(name)s to stay at %(values)s in this order, but after %(previous)g it never stayed at %(value)g"
+        )
+        if plateau_count
+        else translatable("Expected %(name)s to stay at %(values)s in this order, but it never stayed at %(value)g")
+    )
+    message = Sentence(
+        template,
+        name=criterion.series,
+        values=", ".join(f"{value:g}" for value in criterion.plateaus),
+        previous=criterion.plateaus[plateau_count - 1],
+        value=criterion.plateaus[min(plateau_count, count - 1)],
     )
     return Fraction(plateau_count, count), message
 
@@ -281,7 +358,7 @@ def _has_content(entry: tuple[str, str, int], recording: Recording) -> bool:
 
 def _describe_position(recording: Recording, tick: int) -> str:
     pose = get_pose_after(recording, tick)
-    return f"one was taken at ({pose.x:.1f}, {pose.y:.1f})"
+    return Sentence("one was taken at (%(x).1f, %(y).1f)", x=pose.x, y=pose.y)
 
 
 #: The duration of a sensor reading, in seconds. A sample printed sooner after another repeats it.

@@ -15,6 +15,7 @@ from typing import Literal
 from service.grading.judging.geometry import Side, locate_part
 from service.grading.judging.message_parts import quote_list
 from sim.recording import Image, Recording
+from sim.sentences import Sentence
 
 CombinationRule = Literal["first", "any", "majority"]
 _Place = tuple[float, float]
@@ -99,9 +100,17 @@ def _choose_majority(group: Sequence[Sample]) -> Sample:
     top_count = counts[0][1]
     leaders = tuple(str(answer) for answer, count in counts if count == top_count)
     if len(leaders) > 1:
-        description = f"{quote_list(leaders)} were answered equally often for its {len(group)} images"
+        description = Sentence(
+            "%(labels)s were answered equally often for its %(count)s images",
+            labels=quote_list(leaders),
+            count=len(group),
+        )
         return replace(group[0], answer=None, words=description, unnamed=None)
     majority_sample = next(sample for sample in group if sample.answer == leaders[0])
-    return replace(
-        majority_sample, words=f"it was identified as {quote_list(leaders)} {top_count} times in {len(group)} images"
+    description = Sentence(
+        "it was identified as %(label)s %(count)s times in %(images)s images",
+        label=quote_list(leaders),
+        count=top_count,
+        images=len(group),
     )
+    return replace(majority_sample, words=description)

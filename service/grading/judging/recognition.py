@@ -29,11 +29,19 @@ from service.grading.judging.answers import MISSING, as_text, find_at_path, pars
 from service.grading.judging.geometry import Side
 from service.grading.judging.image_replies import Reply, ReplyStatus, collect_replies
 from service.grading.judging.judge_declaration import IndexedTrials
-from service.grading.judging.message_parts import add_hidden_note, describe_early_end, describe_place, quote_text
+from service.grading.judging.message_parts import (
+    add_hidden_note,
+    add_place,
+    describe_early_end,
+    describe_place,
+    quote_text,
+)
 from service.grading.judging.outcome import compute_marks
 from service.grading.judging.patterns import Sample, group_by_pattern
 from service.grading.judging.text_tokens import LabelFinder
 from service.grading.judging.true_labels import NO_IMAGE, collect_labels, find_counted_images, find_missing_label
+from service.language import translatable
+from sim.sentences import Sentence, join_sentences, join_with_and
 from submissions.assignment.definition import Assignment
 from submissions.criteria.recognition import Recognition
 
@@ -138,15 +146,17 @@ def build_recognition_result(
     curves: tuple[AccuracyCurve, ...],
     trials: Mapping[int, TrialResult],
 ) -> CriterionResult:
-    """Return the result for ``share`` of the marks. ``reason`` gives the reason, after the tally."""
+    """Return the result for ``share`` of the marks. ``reason`` is a sentence on it, or empty."""
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
         marks=compute_marks(criterion.marks, share),
         max_marks=criterion.marks,
-        message=_describe_tally(criterion, classification)
-        + reason
-        + _describe_first_mistake(classification.samples, trials),
+        message=join_sentences(
+            _describe_tally(criterion, classification),
+            reason,
+            _describe_first_mistake(classification.samples, trials),
+        ),
         visibility=criterion.visibility,
         evidence=classification.evidence,
         accuracy=classification.accuracy,
@@ -160,11 +170,13 @@ def describe_sample(sample: Sample) -> str:
     """Return a sentence on one image."""
     if sample.image is None:
         if sample.truth == NO_IMAGE:
-            return f"Expected an image (IMG_DATA), but {sample.words}."
-        return f"Expected {quote_text(sample.truth)}, but {sample.words}."
+            return Sentence("Expected an image (IMG_DATA), but %(problem)s.", problem=sample.words)
+        return Sentence("Expected %(label)s, but %(problem)s.", label=quote_text(sample.truth), problem=sample.words)
     if sample.is_correct:
-        return f"The image showed {quote_text(sample.truth)} and was identified correctly."
-    return f"The image showed {quote_text(sample.truth)}, but {sample.words}."
+        return Sentence("The image showed %(label)s and was identified correctly.", label=quote_text(sample.truth))
+    return Sentence(
+        "The image showed %(label)s, but %(problem)s.", label=quote_text(sample.truth), problem=sample.words
+    )
 
 
 def _collect_counted_samples(
@@ -188,11 +200,19 @@ def _collect_counted_samples(
         return counted_samples
     if not counted_samples and criterion.patterns <= 1:
         truth = find_missing_label(criterion, trial)
-        problem = "the robot sent none" if truth == NO_IMAGE else "the robot sent no image"
+        problem = Sentence("the robot sent none") if truth == NO_IMAGE else Sentence("the robot sent no image")
         if criterion.near_start is not None and trial.recording.images:
-            problem += f" from within {criterion.near_start:g} mm of where it started"
+            problem = Sentence(
+                "%(problem)s from within %(distance)g mm of where it started",
+                problem=problem,
+                distance=criterion.near_start,
+            )
         return [Sample(index, None, finder.to_canonical(truth), None, problem)]
-    description = f"the robot sent images of {len(counted_samples)} patterns, and {criterion.patterns} were expected"
+    description = Sentence(
+        "the robot sent images of %(count)s patterns, and %(expected)s were expected",
+        count=len(counted_samples),
+        expected=criterion.patterns,
+    )
     missing_sample = Sample(index, None, NO_IMAGE, None, description)
     return [*counted_samples, *[missing_sample] * (criterion.patterns - len(counted_samples))]
 
@@ -264,7 +284,7 @@ def _read_answer(
     if reply.text is None:
         return None, reply.words, None, None
     if reply.status == "late" and criterion.late == "wrong":
-        return None, f"the answer came too late: {quote_text(reply.text)}", None, None
+        return None, Sentence("the answer came too late: %(answer)s", answer=quote_text(reply.text)), None, None
     text, confidence = reply.text, None
     if criterion.answer_from == "reply":
         value = parse_json_answer(text)
@@ -275,11 +295,12 @@ def _read_answer(
             text = text if answer_value is MISSING else as_text(answer_value)
     found_labels = finder.find_labels(text)
     if not found_labels:
-        return None, f"the answer names no label: {quote_text(text)}", confidence, text
+        return None, Sentence("the answer names no label: %(answer)s", answer=quote_text(text)), confidence, text
+    quotes = join_with_and([quote_text(label) for label in found_labels])
     if len(found_labels) > 1:
-        description = f"the answer names more than one label: {' and '.join(map(quote_text, found_labels))}"
+        description = Sentence("the answer names more than one label: %(labels)s", labels=quotes)
         return None, description, confidence, None
-    return found_labels[0], f"it was identified as {quote_text(found_labels[0])}", confidence, None
+    return found_labels[0], Sentence("it was identified as %(label)s", label=quotes), confidence, None
 
 
 def _parse_probability(value: object) -> float | None:
@@ -290,35 +311,56 @@ def _parse_probability(value: object) -> float | None:
 
 
 def describe_counts(counts: Counts) -> str:
-    """Return counts as ``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers``."""
-    return (
-        f"{counts.sent} images sent: {counts.answered} answered, {counts.late} late, {counts.malformed} malformed, "
-        f"{counts.unanswered} unanswered; {counts.duplicates} duplicate answers"
+    """Return counts as ``9 images sent: 7 answered, 1 late, 0 malformed, 1 unanswered; 2 duplicate answers.``."""
+    return Sentence(
+        "%(sent)s images sent: %(answered)s answered, %(late)s late, %(malformed)s malformed, %(unanswered)s "
+        "unanswered; %(duplicates)s duplicate answers.",
+        sent=counts.sent,
+        answered=counts.answered,
+        late=counts.late,
+        malformed=counts.malformed,
+        unanswered=counts.unanswered,
+        duplicates=counts.duplicates,
     )
 
 
 def _describe_tally(criterion: Recognition, classification: ClassificationResult) -> str:
     accuracy = classification.accuracy
-    unit = "images" if criterion.each_pattern is None else "patterns"
-    text = (
-        f"{classification.correct_count} of {accuracy.n} {unit} identified correctly: accuracy {accuracy.value:.2f} "
-        f"(95 % interval {accuracy.low:.2f} to {accuracy.high:.2f})."
+    template = (
+        translatable(
+            "%(correct)s of %(count)s images identified correctly: accuracy %(accuracy).2f (95 %% interval %(low).2f "
+            "to %(high).2f)."
+        )
+        if criterion.each_pattern is None
+        else translatable(
+            "%(correct)s of %(count)s patterns identified correctly: accuracy %(accuracy).2f (95 %% interval %(low).2f "
+            "to %(high).2f)."
+        )
     )
-    counts = accuracy.counts
-    if counts is not None and (counts.answered != counts.sent or counts.duplicates):
-        text += f" {describe_counts(counts)}."
-    confidence = accuracy.confidence
-    if confidence is not None:
-        confidences = [
-            f"{mean:.2f} when {how} ({count})"
-            for mean, count, how in (
-                (confidence.right, confidence.n_right, "right"),
-                (confidence.wrong, confidence.n_wrong, "wrong"),
-            )
-            if mean is not None
-        ]
-        text += f" Mean confidence {' and '.join(confidences)}."
-    return text
+    tally = Sentence(
+        template,
+        correct=classification.correct_count,
+        count=accuracy.n,
+        accuracy=accuracy.value,
+        low=accuracy.low,
+        high=accuracy.high,
+    )
+    counts, confidence = accuracy.counts, accuracy.confidence
+    has_losses = counts is not None and (counts.answered != counts.sent or counts.duplicates)
+    return join_sentences(
+        tally,
+        describe_counts(counts) if counts is not None and has_losses else "",
+        _describe_confidence(confidence) if confidence is not None else "",
+    )
+
+
+def _describe_confidence(confidence: Confidence) -> str:
+    means = (
+        (translatable("%(mean).2f when right (%(count)s)"), confidence.right, confidence.n_right),
+        (translatable("%(mean).2f when wrong (%(count)s)"), confidence.wrong, confidence.n_wrong),
+    )
+    texts = [Sentence(template, mean=mean, count=count) for template, mean, count in means if mean is not None]
+    return Sentence("Mean confidence %(confidences)s.", confidences=join_with_and(texts))
 
 
 def _describe_first_mistake(samples: Sequence[Sample], trials: Mapping[int, TrialResult]) -> str:
@@ -327,7 +369,5 @@ def _describe_first_mistake(samples: Sequence[Sample], trials: Mapping[int, Tria
     if mistake is None:
         return ""
     trial = trials[mistake.trial]
-    return (
-        f" {describe_place(trial, mistake.image.t if mistake.image else None)}: "
-        f"{describe_sample(mistake)}{describe_early_end(trial)}"
-    )
+    place = describe_place(trial, mistake.image.t if mistake.image else None)
+    return join_sentences(add_place(place, describe_sample(mistake)), describe_early_end(trial))

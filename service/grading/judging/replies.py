@@ -130,8 +130,11 @@ def _add_score(problem: str, right_count: int, count: int) -> str:
 
 
 def _pass_all(pair: AgentPair, count: int) -> Outcome:
-    message = "%(receiver)s answered %(count)s of %(count)s messages as expected."
-    return pass_with(Sentence(message, receiver=pair.first_words, count=count))
+    return pass_with(
+        Sentence(
+            "%(receiver)s answered %(count)s of %(count)s messages as expected.", receiver=pair.first_words, count=count
+        )
+    )
 
 
 def _judge_expected(
@@ -212,9 +215,13 @@ def _judge_order(criterion: Replies, received_messages: list[tuple[int, Message]
         )
     if len(questions) != count:
         actual = Sentence("%(count)s reached it", count=len(questions)) if questions else Sentence("none reached it")
-        expectation = "Expected %(receiver)s to answer %(count)s messages, but %(actual)s."
-        message_text = Sentence(expectation, receiver=pair.receiver_name, count=count, actual=actual)
-        return fail_with(message_text, score=score)
+        problem = Sentence(
+            "Expected %(receiver)s to answer %(count)s messages, but %(actual)s.",
+            receiver=pair.receiver_name,
+            count=count,
+            actual=actual,
+        )
+        return fail_with(problem, score=score)
     return _pass_all(pair, count)
 
 

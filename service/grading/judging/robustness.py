@@ -65,10 +65,10 @@ def _describe_curve(criterion: Robustness, curve: AccuracyCurve) -> str:
     condition = CONDITIONS[criterion.along]
     levels = curve.levels
     if not levels:
-        return f" No trial was swept over {condition.words}."
+        return f"No trial was swept over {condition.words}."
     values_text = ", ".join(f"{level.value:.2f} at {level.at:g}" for level in levels[:_MAX_LISTED_LEVELS])
     ellipsis = ", ..." if len(levels) > _MAX_LISTED_LEVELS else ""
-    text = f" By {condition.words} ({condition.unit}): {values_text}{ellipsis}."
+    text = f"By {condition.words} ({condition.unit}): {values_text}{ellipsis}."
     if criterion.level is None:
         return f"{text} Mean over the sweep: {float(compute_area(levels)):.2f}."
     level_range = find_range_above(levels, criterion.level)

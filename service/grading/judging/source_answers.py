@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sim.sentences import Sentence
 from submissions.criteria.code import SourceRules
 
 #: The calls that make the robot speak.
 SPEECH = ("say()", "speak()")
-_UNREADABLE_SOURCE = "it cannot be read"
+_UNREADABLE_SOURCE = Sentence("it cannot be read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +24,11 @@ class MentionPlace:
     file: str
     line: int
 
-    def __str__(self) -> str:
-        return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
+    def describe(self) -> str:
+        """Return the place as ``line 3 of helper.py``."""
+        if not self.file:
+            return Sentence("line %(line)s", line=self.line)
+        return Sentence("line %(line)s of %(file)s", line=self.line, file=self.file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +53,9 @@ class SourceAnswers:
         """Parse the result of the sandboxed reader. Its form is not trusted."""
         try:
             name, reason, line = result["unread"] or ("", "", None)
-            line_clause = f" (line {int(line)})" if line is not None else ""
+            error: str = str(reason)[:200]
+            if line is not None:
+                error = Sentence("%(error)s (line %(line)s)", error=error, line=int(line))
             answers = (
                 _parse_places(result["uses"], criterion.uses),
                 _parse_places(result["avoids"], criterion.avoids),
@@ -57,12 +63,18 @@ class SourceAnswers:
                 _parse_places(result["defines"], criterion.defines),
                 _parse_places(result["shown"], SPEECH),
             )
-            doubts = tuple(f"{_parse_place(file, line)} has {str(what)[:80]}" for file, line, what in result["doubts"])
+            doubts = tuple(
+                Sentence("%(place)s has %(code)s", place=_parse_place(file, line).describe(), code=str(what)[:80])
+                for file, line, what in result["doubts"]
+            )
         except (LookupError, TypeError, ValueError, OverflowError):
             return cls(error=_UNREADABLE_SOURCE)
         if reason and not name:
-            return cls(error=f"{str(reason)[:200]}{line_clause}")
-        return cls(*answers, doubts, "", f"{str(name)[:60]} cannot be read: {str(reason)[:200]}" if name else "")
+            return cls(error=error)
+        if not name:
+            return cls(*answers, doubts)
+        unread = Sentence("%(file)s cannot be read: %(reason)s", file=str(name)[:60], reason=str(reason)[:200])
+        return cls(*answers, doubts, unread=unread)
 
 
 def _parse_places(positions: Any, rules: Sequence[str]) -> tuple[MentionPlace | None, ...]:

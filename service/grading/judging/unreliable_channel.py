@@ -20,8 +20,10 @@ from service.grading.judging.message_parts import quote_text
 from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
 from service.grading.judging.text_conditions import describe_conditions, is_accepted_text
 from service.grading.judging.text_tokens import split_words
+from service.language import translatable
 from sim.recording import Message, Recording, TimedText, Verdict
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence
 from submissions.criteria.texts import TextConditions
 from submissions.criteria.unreliable_channel import FreshAnswers, InReach, Resends
 
@@ -57,30 +59,41 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
     """Judge how each different text was sent again."""
     recording = trial.recording
     questions = [each for each in _collect_questions(recording) if is_accepted_text(criterion, each.text)]
-    message_kind = _describe_messages(criterion)
     if len(questions) < criterion.at_least:
-        return fail_with(
-            f"Expected the robot to send at least {criterion.at_least} of {message_kind}, but it "
-            f"{_describe_few_questions(questions)}."
+        expected = Sentence(
+            "Expected the robot to send at least %(count)s of %(messages)s",
+            count=criterion.at_least,
+            messages=_describe_messages(criterion),
         )
+        return fail_with(_describe_few_questions(expected, questions))
     mistakes = [(each, found) for each in questions if (found := _find_mistake(criterion, each, recording))]
     tries = sum(len(each.tries) for each in questions)
     measures = (Measure("different messages", len(questions)), Measure("tries", tries))
     count = len(questions)
     if not mistakes:
-        resend_clause = f", {tries - count} of them again" if tries > count else ""
-        last_time = max(message.t for each in questions for message in each.tries)
-        return pass_with(
-            f"The robot sent {tries} messages{resend_clause}, until each of {count} was answered or the robot gave up.",
-            last_time,
-            get_pose_at(recording, last_time),
-            measures,
+        template = (
+            translatable(
+                "The robot sent %(tries)s messages, %(resent)s of them again, until each of %(count)s was answered or "
+                "the robot gave up."
+            )
+            if tries > count
+            else translatable(
+                "The robot sent %(tries)s messages, until each of %(count)s was answered or the robot gave up."
+            )
         )
+        message = Sentence(template, tries=tries, resent=tries - count, count=count)
+        last_time = max(message.t for each in questions for message in each.tries)
+        return pass_with(message, last_time, get_pose_at(recording, last_time), measures)
     question, (t, mistake, findings) = mistakes[0]
     right_count = count - len(mistakes)
     return fail_with(
-        f"Expected the robot to send {quote_text(question.text)} again until its answer "
-        f"comes{_describe_bounds(criterion)}, but {mistake} ({right_count} of {count} messages right).",
+        Sentence(
+            "%(expected)s, but %(mistake)s (%(right)s of %(count)s messages right).",
+            expected=_describe_expected_resends(criterion, question),
+            mistake=mistake,
+            right=right_count,
+            count=count,
+        ),
         t,
         get_pose_at(recording, t),
         Fraction(right_count, count),
@@ -99,30 +112,49 @@ def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
     unreachable_messages = [message for message in sent_messages if is_out_of_reach(message)]
     reach_count = len(sent_messages) - len(unreachable_messages)
     measures = (Measure("sent in reach", reach_count), Measure("sent out of reach", len(unreachable_messages)))
-    summary = f"{reach_count} of {len(sent_messages)} sent in reach"
+    summary = Sentence("%(reach)s of %(count)s sent in reach", reach=reach_count, count=len(sent_messages))
     if len(unreachable_messages) > criterion.misses:
         first_message = unreachable_messages[0]
-        exception_clause = f" but {criterion.misses}" if criterion.misses else ""
+        template = (
+            translatable(
+                "Expected the robot to send all but %(misses)s of %(messages)s in reach of the receiver, but the "
+                "channel lost %(text)s: %(loss)s (%(summary)s)."
+            )
+            if criterion.misses
+            else translatable(
+                "Expected the robot to send all of %(messages)s in reach of the receiver, but the channel lost "
+                "%(text)s: %(loss)s (%(summary)s)."
+            )
+        )
         return fail_with(
-            f"Expected the robot to send all{exception_clause} of {_describe_messages(criterion)} in reach of the "
-            "receiver, "
-            f"but the channel lost {quote_text(first_message.text)}: {describe_loss(first_message)} ({summary}).",
+            Sentence(
+                template,
+                misses=criterion.misses,
+                messages=_describe_messages(criterion),
+                text=quote_text(first_message.text),
+                loss=describe_loss(first_message),
+                summary=summary,
+            ),
             first_message.t,
             get_pose_at(recording, first_message.t),
             Fraction(reach_count, len(sent_messages)),
             measures,
         )
     if reach_count < criterion.at_least:
+        expected = Sentence(
+            "Expected the robot to send at least %(count)s of %(messages)s in reach of the receiver",
+            count=criterion.at_least,
+            messages=_describe_messages(criterion),
+        )
+        actual = Sentence("it sent %(count)s", count=reach_count) if reach_count else Sentence("it sent none")
         return fail_with(
-            f"Expected the robot to send at least {criterion.at_least} of {_describe_messages(criterion)} in reach of "
-            f"the receiver, but it sent {reach_count or 'none'}.",
+            Sentence("%(expected)s, but %(actual)s.", expected=expected, actual=actual),
             score=Fraction(reach_count, criterion.at_least),
             measures=measures,
         )
     last_message = sent_messages[-1]
-    return pass_with(
-        f"The robot was in reach: {summary}.", last_message.t, get_pose_at(recording, last_message.t), measures
-    )
+    message = Sentence("The robot was in reach: %(summary)s.", summary=summary)
+    return pass_with(message, last_message.t, get_pose_at(recording, last_message.t), measures)
 
 
 @declare_judge(FreshAnswers)
@@ -130,9 +162,9 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
     """Judge each report against the answers to the text sent last before it, and against all other answers."""
     recording = trial.recording
     questions = _collect_questions(recording)
-    expected = "Expected the robot to report only answers to the message that it sent last"
+    expected = Sentence("Expected the robot to report only answers to the message that it sent last")
     if len(questions) < criterion.at_least:
-        return fail_with(f"{expected}, but it {_describe_few_questions(questions)}.")
+        return fail_with(_describe_few_questions(expected, questions))
     answers = _AnswerTimes(criterion, questions)
     fresh_texts: set[str] = set()
     stale_reports: dict[str, tuple[TimedText, str]] = {}
@@ -146,47 +178,62 @@ def judge_fresh_answers(criterion: FreshAnswers, trial: TrialResult) -> Outcome:
     expected_questions = {each.text: each for each in questions if not each.excused}
     right_count = len(fresh_texts - stale_reports.keys())
     judged_count = len(expected_questions.keys() | fresh_texts | stale_reports.keys())
-    summary = f"({right_count} of {judged_count} answers right)"
+
+    def fail_at(time: float, problem: str) -> Outcome:
+        message = Sentence(
+            "%(expected)s, but %(problem)s (%(right)s of %(count)s answers right).",
+            expected=expected,
+            problem=problem,
+            right=right_count,
+            count=judged_count,
+        )
+        return fail_with(message, time, get_pose_at(recording, time), Fraction(right_count, judged_count))
+
     if stale_reports:
         last_question, (line, stale_text) = next(iter(stale_reports.items()))
-        return fail_with(
-            f"{expected}, but after {quote_text(last_question)} it reported {quote_text(line.text)}, which is the "
-            f"answer to {quote_text(stale_text)} {summary}.",
-            line.t,
-            get_pose_at(recording, line.t),
-            Fraction(right_count, judged_count),
+        problem = Sentence(
+            "after %(question)s it reported %(report)s, which is the answer to %(other)s",
+            question=quote_text(last_question),
+            report=quote_text(line.text),
+            other=quote_text(stale_text),
         )
+        return fail_at(line.t, problem)
     missing_question = next((each for text, each in expected_questions.items() if text not in fresh_texts), None)
     if missing_question is not None:
-        time = missing_question.tries[-1].t if missing_question.answered_at is None else missing_question.answered_at
-        problem = (
-            _describe_missing_answer(missing_question)
-            if missing_question.answered_at is None
-            else (
-                f"the answer to {quote_text(missing_question.text)} came at {time:.2f} s and no line that begins with "
-                f"{quote_text(criterion.after)} has it"
-            )
+        if missing_question.answered_at is None:
+            return fail_at(missing_question.tries[-1].t, _describe_missing_answer(missing_question))
+        problem = Sentence(
+            "the answer to %(text)s came at %(seconds).2f s and no line that begins with %(start)s has it",
+            text=quote_text(missing_question.text),
+            seconds=missing_question.answered_at,
+            start=quote_text(criterion.after),
         )
-        return fail_with(
-            f"{expected}, but {problem} {summary}.",
-            time,
-            get_pose_at(recording, time),
-            Fraction(right_count, judged_count),
-        )
+        return fail_at(missing_question.answered_at, problem)
     if not judged_count:
         return pass_with(
-            "The channel lost every message or its answer by chance, and the robot reported no wrong answer."
+            Sentence("The channel lost every message or its answer by chance, and the robot reported no wrong answer.")
         )
-    return pass_with(f"{right_count} of {judged_count} answers were reported, each for the message sent last.")
+    return pass_with(
+        Sentence(
+            "%(right)s of %(count)s answers were reported, each for the message sent last.",
+            right=right_count,
+            count=judged_count,
+        )
+    )
 
 
 def _describe_missing_answer(question: _Question) -> str:
-    """Return a sentence that no answer came, with the reason if it was not a random loss."""
+    """Return a clause that no answer came, with the reason if it was not a random loss."""
+    problem = Sentence("no answer to %(text)s came", text=quote_text(question.text))
     lost_message = next(filter(is_out_of_reach, (*question.tries, *question.replies)), None)
-    reason = (
-        f": the channel lost {quote_text(lost_message.text)} ({describe_loss(lost_message)})" if lost_message else ""
+    if lost_message is None:
+        return problem
+    return Sentence(
+        "%(problem)s: the channel lost %(text)s (%(loss)s)",
+        problem=problem,
+        text=quote_text(lost_message.text),
+        loss=describe_loss(lost_message),
     )
-    return f"no answer to {quote_text(question.text)} came{reason}"
 
 
 class _AnswerTimes:
@@ -261,24 +308,41 @@ def _find_mistake(
     times = [message.t for message in question.tries]
     for number, (t, next_time) in enumerate(zip(times, [*times[1:], None], strict=True), 1):
         if answer_time is not None and t > answer_time + 1e-9:
-            description = f"it sent the message again at {t:.2f} s, after its answer had come at {answer_time:.2f} s"
+            description = Sentence(
+                "it sent the message again at %(time).2f s, after its answer had come at %(answer).2f s",
+                time=t,
+                answer=answer_time,
+            )
             return t, description, (LateResend(),)
         if criterion.at_most is not None and number > criterion.at_most:
-            return t, f"it sent the message {len(times)} times", ()
+            return t, Sentence("it sent the message %(count)s times", count=len(times)), ()
         if next_time is not None and next_time - t < minimum - _ROUNDING:
-            return (
-                next_time,
-                f"it did not wait for the answer: it sent the message at {t:.2f} s and again at {next_time:.2f} s",
-                (),
+            description = Sentence(
+                "it did not wait for the answer: it sent the message at %(time).2f s and again at %(next).2f s",
+                time=t,
+                next=next_time,
             )
+            return next_time, description, ()
         if next_time is not None and next_time - t > maximum + _ROUNDING:
-            return t, f"it sent the message at {t:.2f} s and again only at {next_time:.2f} s", ()
+            description = Sentence(
+                "it sent the message at %(time).2f s and again only at %(next).2f s", time=t, next=next_time
+            )
+            return t, description, ()
         is_last_try = next_time is None and (criterion.at_most is None or number < criterion.at_most)
         if is_last_try and answer_time is None and _has_stopped_trying(t, maximum, recording):
-            description = f"it sent the message {_format_times(number)}, last at {t:.2f} s, and no answer came"
+            description = Sentence(
+                "it sent the message %(times)s, last at %(time).2f s, and no answer came",
+                times=_format_times(number),
+                time=t,
+            )
             return t, description, (MissingAnswer(),)
         if is_last_try and answer_time is not None and end_time - t > maximum + _ROUNDING:
-            return t, f"it sent the message {_format_times(number)}, and its answer came only at {end_time:.2f} s", ()
+            description = Sentence(
+                "it sent the message %(times)s, and its answer came only at %(time).2f s",
+                times=_format_times(number),
+                time=end_time,
+            )
+            return t, description, ()
     return None
 
 
@@ -309,16 +373,25 @@ def _extract_value(criterion: FreshAnswers, answer: Message) -> str:
 
 def _describe_messages(criterion: TextConditions) -> str:
     conditions = describe_conditions(criterion)
-    return f"the messages: {conditions}" if conditions else "its messages"
+    return Sentence("the messages: %(conditions)s", conditions=conditions) if conditions else Sentence("its messages")
 
 
-def _describe_few_questions(questions: Sequence[_Question]) -> str:
-    return f"sent only {len(questions)} different" if questions else "sent nothing"
+def _describe_few_questions(expected: str, questions: Sequence[_Question]) -> str:
+    if not questions:
+        return Sentence("%(expected)s, but it sent nothing.", expected=expected)
+    return Sentence("%(expected)s, but it sent only %(count)s different.", expected=expected, count=len(questions))
 
 
-def _describe_bounds(criterion: Resends) -> str:
-    return f", at most {criterion.at_most} times in all" if criterion.at_most is not None else ""
+def _describe_expected_resends(criterion: Resends, question: _Question) -> str:
+    template = (
+        translatable("Expected the robot to send %(text)s again until its answer comes")
+        if criterion.at_most is None
+        else translatable(
+            "Expected the robot to send %(text)s again until its answer comes, at most %(count)s times in all"
+        )
+    )
+    return Sentence(template, text=quote_text(question.text), count=criterion.at_most)
 
 
 def _format_times(number: int) -> str:
-    return "once" if number == 1 else f"{number} times"
+    return Sentence("once") if number == 1 else Sentence("%(count)s times", count=number)
