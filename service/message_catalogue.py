@@ -45,6 +45,7 @@ _SUBMISSION_ERROR_SOURCES = [
     (f"{name}.py", "python")
     for name in (
         "bundle",
+        "diagram_cells",
         "file_kinds",
         "marked_run",
         "notebook",

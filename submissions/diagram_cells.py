@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from sim.errors import UsageError
+from sim.sentences import Sentence
 from submissions.diagram import Diagram, DiagramKind
 from submissions.diagram_text import read_diagram
 from submissions.source_text import find_magic_line
@@ -52,18 +53,30 @@ def read_diagrams(notebook: Notebook | None) -> NotebookDiagrams:
         if magic_line is None or magic is None:
             continue
         if len(diagram_cells) + len(problems) == MAX_DIAGRAMS:
-            problems.append(f"cell {cell.number}: of all diagrams only the first {MAX_DIAGRAMS} are drawn")
+            problems.append(
+                Sentence(
+                    "cell %(cell)s: of all diagrams only the first %(count)s are drawn",
+                    cell=cell.number,
+                    count=MAX_DIAGRAMS,
+                )
+            )
             break
         kind = cast(DiagramKind, magic["kind"])
         try:
             diagram = read_diagram(kind, "\n".join(lines[magic_line + 1 :]), magic_line + 2)
         except UsageError as error:
-            problems.append(f"cell {cell.number}, {error}; the diagram is not drawn")
+            problems.append(
+                Sentence("cell %(cell)s, %(error)s; the diagram is not drawn", cell=cell.number, error=error.message)
+            )
             continue
         if diagram.parts > remaining_parts:
             problems.append(
-                f"cell {cell.number}: all diagrams together have more than {MAX_PARTS} actors, steps and texts; "
-                "this one is not drawn"
+                Sentence(
+                    "cell %(cell)s: all diagrams together have more than %(count)s actors, steps and texts; this one "
+                    "is not drawn",
+                    cell=cell.number,
+                    count=MAX_PARTS,
+                )
             )
             continue
         remaining_parts -= diagram.parts

@@ -118,14 +118,21 @@ def choose_run(notebook: Notebook, assignment: Assignment, requested_run: str | 
     """
     marked_run = find_run(notebook, assignment.parts.cell, requested_run)
     if assignment.parts.cell != LAST:
-        ignored_note = f"run = {requested_run} is not used: the assignment says which run is marked"
-        return RunChoice(marked_run, True, notes=(ignored_note,) if requested_run is not None else ())
+        if requested_run is None:
+            return RunChoice(marked_run, True)
+        ignored_note = Sentence("run = %(run)s is not used: the assignment says which run is marked", run=requested_run)
+        return RunChoice(marked_run, True, notes=(ignored_note,))
     runs = find_runs(notebook)
     misfits = {run: tuple(_find_mismatches(run, assignment)) for run in runs}
     if requested_run is not None:
-        return RunChoice(marked_run, True, notes=_explain_choice(misfits, marked_run, f"as run = {requested_run} asks"))
+        request = Sentence("as run = %(run)s asks", run=requested_run)
+        return RunChoice(marked_run, True, notes=_explain_choice(misfits, marked_run, request))
     best, *other_runs = sorted(runs, key=lambda run: (len(misfits[run]), -run.number))
-    reason = "the last that fits" if not misfits[best] else f"which fits best, though {', '.join(misfits[best])}"
+    reason = (
+        Sentence("which fits best, though %(misfits)s", misfits=_join_with_commas(misfits[best]))
+        if misfits[best]
+        else Sentence("the last that fits")
+    )
     return RunChoice(best, False, tuple(run.site for run in other_runs), _explain_choice(misfits, best, reason))
 
 
@@ -201,17 +208,31 @@ def _explain_choice(misfits: dict[ProgramRun, tuple[str, ...]], marked_run: Prog
     if len(misfits) < 2:
         return ()
     other_runs = [_describe_other_run(run, found) for run, found in misfits.items() if run != marked_run]
-    more_text = f" and {len(other_runs) - _MAX_LISTED_RUNS} more" if len(other_runs) > _MAX_LISTED_RUNS else ""
+    others = _join_with_commas(other_runs[:_MAX_LISTED_RUNS])
+    if len(other_runs) > _MAX_LISTED_RUNS:
+        others = Sentence("%(runs)s and %(count)s more", runs=others, count=len(other_runs) - _MAX_LISTED_RUNS)
     return (
-        f"that is run {marked_run.number} of {len(misfits)}, {reason}; the others are "
-        f"{', '.join(other_runs[:_MAX_LISTED_RUNS])}{more_text}",
-        "another run is marked with --run NUMBER, or with run = NUMBER in submission.toml",
+        Sentence(
+            "that is run %(number)s of %(count)s, %(reason)s; the others are %(others)s",
+            number=marked_run.number,
+            count=len(misfits),
+            reason=reason,
+            others=others,
+        ),
+        Sentence("another run is marked with --run NUMBER, or with run = NUMBER in submission.toml"),
     )
 
 
+def _join_with_commas(parts: Sequence[str]) -> str:
+    return functools.reduce(lambda these, last: Sentence("%(these)s, %(last)s", these=these, last=last), parts)
+
+
 def _describe_other_run(run: ProgramRun, misfits: Sequence[str]) -> str:
-    reason = f": {misfits[0]}" if misfits else ""
-    return f"run {run.number} (cell {run.site.cell}{reason})"
+    if not misfits:
+        return Sentence("run %(number)s (cell %(cell)s)", number=run.number, cell=run.site.cell)
+    return Sentence(
+        "run %(number)s (cell %(cell)s: %(misfit)s)", number=run.number, cell=run.site.cell, misfit=misfits[0]
+    )
 
 
 def _find_mismatches(run: ProgramRun, assignment: Assignment) -> Iterator[str]:
@@ -219,12 +240,12 @@ def _find_mismatches(run: ProgramRun, assignment: Assignment) -> Iterator[str]:
     world, has_responder = assignment.world, assignment.parts.responder != "none"
     text = run.program.source if run.program is not None else ""
     if world.image is None and run.floor is not None and run.floor != world.background:
-        yield f"its floor is {run.floor[:40]}"
+        yield Sentence("its floor is %(floor)s", floor=run.floor[:40])
     is_sending = any(word in text for word in _SENDS)
     if has_responder and not is_sending:
-        yield "it sends nothing to the responder"
+        yield Sentence("it sends nothing to the responder")
     if not (has_responder and is_sending) and _is_test(comment_out_magic(text)):
-        yield "it only prints"
+        yield Sentence("it only prints")
 
 
 @functools.lru_cache(maxsize=64)

@@ -265,16 +265,14 @@ class Grade:
 def build_unjudged_notes(criteria: Sequence[CriterionResult]) -> tuple[str, ...]:
     """Return a note on the number of criteria that could not be judged; empty if all were judged."""
     count = sum(bool(result.unjudged) for result in criteria)
+    if not count:
+        return ()
     return (
-        (
-            Sentence(
-                "%(count)s of %(criteria)s criteria could not be judged; staff will review them",
-                count=count,
-                criteria=len(criteria),
-            ),
-        )
-        if count
-        else ()
+        Sentence(
+            "%(count)s of %(criteria)s criteria could not be judged; staff will review them",
+            count=count,
+            criteria=len(criteria),
+        ),
     )
 
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 from responders.repeated_faults import REPLAY_NOTES, FaultReplay, ReplayDiverged
@@ -21,6 +22,7 @@ from service.grading.model_training import add_model_answers
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
+from service.language import translatable
 from service.version import GRADER_VERSION
 from sim.errors import AssignmentError
 from sim.floors import Floor, build_floor, build_floor_from_image
@@ -28,6 +30,7 @@ from sim.motion import Physics
 from sim.random_streams import RandomStream
 from sim.recording import BROWSER_TICK, TICK, Recording
 from sim.robot import get_robot
+from sim.sentences import Sentence
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
 from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed
@@ -35,6 +38,19 @@ from submissions.submission import PART_FILES, Submission
 
 _MEGABYTE = 1 << 20
 _OBSERVE_SECONDS = 1.0
+#: The note on trials that ran without a child, for each role in ``REPLAY_NOTES``.
+_SPARED_NOTES: Mapping[str, str] = MappingProxyType(
+    {
+        "robot": translatable(
+            "the robot program was not run again in %(count)s of %(trials)s trials: two trials had ended with the same "
+            "fault, and the program had the same input and uses no random numbers, so the result would be the same"
+        ),
+        "responder": translatable(
+            "the responder was not run again in %(count)s of %(trials)s trials: two trials had ended with the same "
+            "fault, and the program had the same input and uses no random numbers, so the result would be the same"
+        ),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,12 +188,9 @@ def _is_visible(trial: Trial) -> bool:
 def _build_spared_notes(results: Sequence[TrialResult]) -> tuple[str, ...]:
     """Return notes on visible trials that ran without a child. Hidden trials are not counted."""
     visible_notes = [result.recording.notes for result in results if result.visibility == "visible"]
-    counts = [(note, sum(note in notes for notes in visible_notes)) for note in REPLAY_NOTES.values()]
+    counts = {role: sum(note in notes for notes in visible_notes) for role, note in REPLAY_NOTES.items()}
     return tuple(
-        f"{note.replace('this trial', f'{count} of {len(visible_notes)} trials')}: two trials had ended with the same "
-        "fault, and the program had the same input and uses no random numbers, so the result would be the same"
-        for note, count in counts
-        if count
+        Sentence(_SPARED_NOTES[role], count=count, trials=len(visible_notes)) for role, count in counts.items() if count
     )
 
 

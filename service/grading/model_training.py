@@ -22,10 +22,13 @@ from service.grading.run_plan import RunPlan
 from service.grading.trial_runner import TrialRunner
 from sim.random_streams import RandomStream
 from sim.recording import Fault, Image, Message, Recording, Verdict
+from sim.sentences import Sentence
 from submissions.assignment.definition import Training
 
-_HINT = "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
-_COLLECT = 'Log images while the robot stands over something, with print("image_data both").'
+_HINT = Sentence(
+    "Your function is called once, with all images and labels; call it yourself with a few rows of numbers."
+)
+_COLLECT = Sentence('Log images while the robot stands over something, with print("image_data both").')
 _SIDE = {"focus": 14, "whole": 20}
 
 
@@ -88,10 +91,14 @@ def add_model_answers(
 
 def _build_no_images_fault(images: int, plan: RunPlan) -> Fault:
     """Return the fault of a run without training images. It is the student's only if the program is theirs."""
-    collection_clause = (
-        "collected no images" if not images else f"collected {images} images, but none over a known label"
+    sentence = (
+        Sentence(
+            "the robot collected %(count)s images, but none over a known label, so there is nothing to train on",
+            count=images,
+        )
+        if images
+        else Sentence("the robot collected no images, so there is nothing to train on")
     )
-    sentence = f"the robot {collection_clause}, so there is nothing to train on"
     if plan.assignment.parts.program != "student":
         return Fault(0.0, Verdict.ASSIGNMENT_ERROR, "assignment", sentence)
     return Fault(0.0, Verdict.PROGRAM_ERROR, "program", sentence, hint=_COLLECT)

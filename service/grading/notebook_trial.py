@@ -17,6 +17,7 @@ from service.grading.notebook_runs import LoadedProgram, NotebookRuns, UnmarkedR
 from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
+from sim.sentences import Sentence, join_sentences
 from submissions.magics import Flags, SimulatorSettings
 from submissions.marked_run import RunChoice, RunSite
 
@@ -48,6 +49,7 @@ class NotebookTrial:
         replacement = self._choose_replacement(started_sites) if execution.marked_run is None else None
         if replacement is not None:
             assert site is not None
+            # Plain text, because it is stored with the recording.
             note = f"the run of cell {site.cell} never started, so the run of cell {replacement.cell} is marked"
             execution, _ = self._execute_notebook(spec, obstacles, replacement, runner, meter)
             execution = replace(execution, notes=(note, *execution.notes))
@@ -124,13 +126,22 @@ def _explain_unstarted_run(execution: ExecutedNotebook, site: RunSite | None) ->
 
     It counts as a fault of the program, which did not run.
     """
-    explanation = f"The robot program of cell {site.cell} is marked, but it never ran." if site is not None else ""
+    explanation = (
+        Sentence("The robot program of cell %(cell)s is marked, but it never ran.", cell=site.cell)
+        if site is not None
+        else ""
+    )
     cell_fault = next((fault for fault in execution.raised if site is not None and fault.cell == site.cell), None)
     cause = execution.stopped or cell_fault
     if cause is None:
-        hint = f"In {execution.raised[0].place}: {execution.raised[0].message}" if execution.raised else ""
+        first_fault = execution.raised[0] if execution.raised else None
+        hint = (
+            Sentence("In %(place)s: %(fault)s", place=first_fault.place, fault=first_fault.message)
+            if first_fault is not None
+            else ""
+        )
         cell = site.cell if site is not None else None
-        message = f"{explanation} No cell of the notebook started it."
+        message = join_sentences(explanation, Sentence("No cell of the notebook started it."))
         return Fault(0.0, Verdict.PROGRAM_ERROR, "program", message, cell=cell, hint=hint)
     verdict = Verdict.PROGRAM_ERROR if cause.verdict is Verdict.RESPONDER_ERROR else cause.verdict
     return replace(cause, who="program", verdict=verdict, hint=explanation)

@@ -9,6 +9,7 @@ from responders.sandbox.running_child import ChildLimits
 from responders.source_file import SourceFile
 from responders.trial_spec import ProgramSpec, ResponderSpec
 from sim.errors import UsageError
+from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
 from submissions.magics import Flags, apply_flags, comment_out_magic, split_program
@@ -51,17 +52,29 @@ def read_head(text: str, assignment: Assignment) -> ProgramHead:
         flags, text = split_program(text)
         settings = apply_flags(flags)
     except UsageError as error:
-        note = f"the program's magic line is ignored: {error}"
+        note = Sentence("the program's magic line is ignored: %(error)s", error=error.message)
         return ProgramHead(Flags(), comment_out_magic(text), (note,), str(error))
     world = assignment.world
-    notes = []
+    notes: list[str] = []
     if "b" in flags.values and settings.background != world.background:
         background = flags.values["b"][:40]
-        notes.append(f"the program selects the floor {background}, but the assignment uses {world.background}")
+        notes.append(
+            Sentence(
+                "the program selects the floor %(floor)s, but the assignment uses %(expected)s",
+                floor=background,
+                expected=world.background,
+            )
+        )
     if "r" in flags.values and settings.robot != world.robot:
-        notes.append(f"the program selects the robot {settings.robot}, but the assignment uses {world.robot}")
+        notes.append(
+            Sentence(
+                "the program selects the robot %(robot)s, but the assignment uses %(expected)s",
+                robot=settings.robot,
+                expected=world.robot,
+            )
+        )
     if flags.values.keys() & {"N", "M"}:
-        notes.append("the assignment's noise is used, not the program's -N or -M")
+        notes.append(Sentence("the assignment's noise is used, not the program's -N or -M"))
     return ProgramHead(flags, text, tuple(notes))
 
 

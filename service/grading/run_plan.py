@@ -25,9 +25,11 @@ from service.grading.part_specs import (
     read_head,
 )
 from service.grading.trial_runner import TrialRunner
+from service.language import translatable
 from sim.errors import UsageError
 from sim.motion import Rectangle
 from sim.recording import Recording
+from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.assignment.other_parts import SAME
 from submissions.criteria.code import Functions, SourceRules
@@ -187,7 +189,7 @@ def _plan_files(submission: Submission, assignment: Assignment) -> RunPlan:
     head = read_head(code.text, assignment) if code is not None else ProgramHead(Flags(), "", ())
     notes = head.notes
     if submission.responder is not None and responder is not submission.responder:
-        notes += ("your responder is not used: this assignment uses another one, or none",)
+        notes += (Sentence("your responder is not used: this assignment uses another one, or none"),)
     files = collect_files(submission, assignment, parts.program)
     program = (
         build_program_spec(SourceFile(code.name, head.text), head.flags, files, assignment)
@@ -197,7 +199,7 @@ def _plan_files(submission: Submission, assignment: Assignment) -> RunPlan:
     responder_spec = build_responder_spec(responder, collect_files(submission, assignment, parts.responder), assignment)
     plan = _plan_separate_parts(ProgramTrial(), program, head.flags, responder_spec, assignment, notes)
     if missing_part == "program" and (question_program := _build_question_program(assignment)) is not None:
-        note = "your responder was called by a Robomark program that only sends the texts"
+        note = Sentence("your responder was called by a Robomark program that only sends the texts")
         plan = replace(plan, program=question_program, notes=(*plan.notes, note))
     # Text sent to a missing responder is still a message.
     collaborative = plan.collaborative or missing_part == "responder"
@@ -231,8 +233,15 @@ def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assig
         # Executing the notebook reports an unreadable magic line, and may reach another cell.
         notes = () if head.ignored else head.notes
         if cell is not None:
-            rerun_clause = "" if site.cell == cell.number else f", because it is run again by cell {site.cell}"
-            marked_note = f"the robot program in cell {cell.number} of {notebook.name} is marked{rerun_clause}"
+            template = (
+                translatable("the robot program in cell %(cell)s of %(notebook)s is marked")
+                if site.cell == cell.number
+                else translatable(
+                    "the robot program in cell %(cell)s of %(notebook)s is marked, because it is run again by cell "
+                    "%(site)s"
+                )
+            )
+            marked_note = Sentence(template, cell=cell.number, notebook=notebook.name, site=site.cell)
             notes = (marked_note, *choice.notes, *notes)
         return _plan_executed_notebook(
             submission, notebook, assignment, SourceFile(notebook.name, head.text), head.flags, notes, choice
@@ -243,7 +252,10 @@ def _plan_notebook(submission: Submission, notebook: Notebook, assignment: Assig
     files = collect_files(submission, assignment, parts.program)
     program = build_program_spec(SourceFile(f"cell {cell.number}", head.text), head.flags, files, assignment)
     responder_spec = build_responder_spec(responder, collect_files(submission, assignment, parts.responder), assignment)
-    notes = (*head.notes, f"of {notebook.name} only the robot program in cell {cell.number} is run", *choice.notes)
+    only_note = Sentence(
+        "of %(notebook)s only the robot program in cell %(cell)s is run", notebook=notebook.name, cell=cell.number
+    )
+    notes = (*head.notes, only_note, *choice.notes)
     plan = _plan_separate_parts(ProgramTrial(cell.number), program, head.flags, responder_spec, assignment, notes)
     return replace(plan, ignored_magic=head.ignored)
 
