@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +22,12 @@ from service.grading.judging.geometry import (
     find_true_runs,
     to_relative_position,
 )
+from service.grading.judging.message_parts import join_clauses
+from service.language import translatable
 from sim.recording import Recording
 from sim.recording_values import get_recorded_robot, tick_to_seconds
-from submissions.criteria.motion import MotionConditions
+from sim.sentences import Sentence, join_with_and
+from submissions.criteria.motion import MotionConditions, NamedMotion
 
 #: A smaller relative difference between the wheels counts as straight.
 _STRAIGHT = 0.1
@@ -32,7 +37,6 @@ _LASTING = 9
 _NO_BOUND = 10_000
 #: A rest of at most this many ticks does not split a move.
 _REST = 2
-_LEFT = " to the left"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +55,22 @@ class Move:
         """The straight distance from the move's start to its end, mm."""
         return math.hypot(self.forward, self.sideways)
 
-    def __str__(self) -> str:
+    def describe(self) -> str:
+        """Return the move as ``turned 90.0° left and went 200 mm forwards in 2.00 s``."""
         clauses = []
         if abs(self.turn) >= 2:
-            clauses.append(f"turned {abs(self.turn):.1f}° {'left' if self.turn > 0 else 'right'}")
+            left, right = translatable("turned %(angle).1f° left"), translatable("turned %(angle).1f° right")
+            clauses.append(Sentence(left if self.turn > 0 else right, angle=abs(self.turn)))
         if self.distance >= 5 or not clauses:
-            direction = "forwards" if self.forward >= 0 else "backwards"
-            clauses.append(f"went {abs(self.forward):.0f} mm {direction}")
+            ahead, back = (
+                translatable("went %(distance).0f mm forwards"),
+                translatable("went %(distance).0f mm backwards"),
+            )
+            clauses.append(Sentence(ahead if self.forward >= 0 else back, distance=abs(self.forward)))
         if abs(self.sideways) >= 5:
-            clauses.append(f"{abs(self.sideways):.0f} mm to its {'left' if self.sideways > 0 else 'right'}")
-        return f"{' and '.join(clauses)} in {self.seconds:.2f} s"
+            left, right = translatable("%(distance).0f mm to its left"), translatable("%(distance).0f mm to its right")
+            clauses.append(Sentence(left if self.sideways > 0 else right, distance=abs(self.sideways)))
+        return Sentence("%(motion)s in %(seconds).2f s", motion=join_with_and(clauses), seconds=self.seconds)
 
 
 def split_moves(recording: Recording) -> tuple[Move, ...]:
@@ -105,42 +115,126 @@ def _classify_ticks(recording: Recording) -> NDArray[np.int8]:
 class Mismatch:
     """The difference between a move and the required one, as ``a turn of 85 to 95°, but it was 80°``."""
 
-    words: str
+    description: str
     is_other_side: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Direction:
+    """Templates for a measure of a move in one direction: the expected one, an actual one, and a part of a move."""
+
+    expected: str
+    actual: str
+    part: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Axis:
+    """A measure of a move: the directions of its positive and negative values, and its unit."""
+
+    positive: _Direction
+    negative: _Direction
+    unit: str
+    has_sides: bool = False
+
+
+_AMOUNT = "%(amount)s"
+_FORWARDS, _BACKWARDS = translatable("%(amount)s forwards"), translatable("%(amount)s backwards")
+_TO_LEFT, _TO_RIGHT = translatable("%(amount)s to the left"), translatable("%(amount)s to the right")
+_DISTANCE = _Direction(
+    translatable("a distance from where it began of %(range)s"),
+    _AMOUNT,
+    translatable("%(amount)s away from where it began"),
+)
+_TURN_SIZE = _Direction(translatable("a turn of %(range)s"), _AMOUNT, translatable("%(amount)s of turn"))
+_DURATION = _Direction(translatable("a time of %(range)s"), _AMOUNT, translatable("%(amount)s long"))
+#: By the names of the conditions, in the order in which they are checked.
+_AXES: Mapping[str, _Axis] = MappingProxyType(
+    {
+        "distance": _Axis(_DISTANCE, _DISTANCE, " mm"),
+        "forward": _Axis(
+            _Direction(translatable("a distance forwards of %(range)s"), _FORWARDS, _FORWARDS),
+            _Direction(translatable("a distance backwards of %(range)s"), _BACKWARDS, _BACKWARDS),
+            " mm",
+        ),
+        "sideways": _Axis(
+            _Direction(translatable("a distance to the left of %(range)s"), _TO_LEFT, _TO_LEFT),
+            _Direction(translatable("a distance to the right of %(range)s"), _TO_RIGHT, _TO_RIGHT),
+            " mm",
+            has_sides=True,
+        ),
+        "turn": _Axis(
+            _Direction(
+                translatable("a turn to the left of %(range)s"),
+                _TO_LEFT,
+                translatable("%(amount)s of turn to the left"),
+            ),
+            _Direction(
+                translatable("a turn to the right of %(range)s"),
+                _TO_RIGHT,
+                translatable("%(amount)s of turn to the right"),
+            ),
+            "°",
+            has_sides=True,
+        ),
+        "turn_size": _Axis(_TURN_SIZE, _TURN_SIZE, "°"),
+        "seconds": _Axis(_DURATION, _DURATION, " s"),
+    }
+)
+#: The order in which the conditions of a required move are named.
+_PARTS = ("forward", "sideways", "distance", "turn", "turn_size", "seconds")
 
 
 def find_mismatch(required: MotionConditions, move: Move) -> Mismatch | None:
     """Return the first condition that a move does not meet; None if it meets all."""
-    conditions = (
-        ("a distance from where it began", "", "", required.distance, move.distance, " mm"),
-        ("a distance", " forwards", " backwards", required.forward, move.forward, " mm"),
-        ("a distance", _LEFT, " to the right", required.sideways, move.sideways, " mm"),
-        ("a turn", _LEFT, " to the right", required.turn, move.turn, "°"),
-        ("a turn", "", "", required.turn_size, abs(move.turn), "°"),
-        ("a time", "", "", required.seconds, move.seconds, " s"),
-    )
-    for noun, positive, negative, bounds, value, unit in conditions:
+    for name, axis in _AXES.items():
+        bounds = getattr(required, name)
+        value = abs(move.turn) if name == "turn_size" else getattr(move, name)
         if bounds is None or bounds[0] <= value <= bounds[1]:
             continue
-        side, minimum, maximum = orient_range(bounds, positive, negative)
-        actual = format_number(abs(value))
-        direction = "" if actual == "0" else negative if value < 0 else positive
-        words = f"{noun}{side} of {describe_range(minimum, maximum, unit)}, but it was {actual}{unit}{direction}"
-        return Mismatch(words, positive == _LEFT and bool(direction) and side != direction)
+        direction, minimum, maximum = _orient_range(axis, bounds)
+        actual_direction = axis.negative if value < 0 else axis.positive
+        number = format_number(abs(value))
+        description = Sentence(
+            "%(expected)s, but it was %(actual)s",
+            expected=Sentence(direction.expected, range=_describe_range(minimum, maximum, axis.unit)),
+            actual=Sentence(_AMOUNT if number == "0" else actual_direction.actual, amount=f"{number}{axis.unit}"),
+        )
+        return Mismatch(description, axis.has_sides and number != "0" and direction is not actual_direction)
     return None
 
 
-def orient_range(bounds: tuple[float, float], positive: str, negative: str) -> tuple[str, float, float]:
-    """Return a negative range as a positive one, with the word for its side."""
+def count_missed_conditions(required: MotionConditions, move: Move) -> int:
+    """Return how many of the conditions a move misses."""
+    conditions = (name for name in _AXES if getattr(required, name) is not None)
+    return sum(find_mismatch(NamedMotion(**{name: getattr(required, name)}), move) is not None for name in conditions)
+
+
+def describe_required_move(required: NamedMotion) -> str:
+    """Return the conditions as ``a move of 95 to 105 mm forwards, 1 s long``, after the move's name if it has one."""
+    parts = []
+    for name in _PARTS:
+        bounds = getattr(required, name)
+        if bounds is not None:
+            direction, minimum, maximum = _orient_range(_AXES[name], bounds)
+            parts.append(Sentence(direction.part, amount=_describe_range(minimum, maximum, _AXES[name].unit)))
+    move = Sentence("a move of %(parts)s", parts=join_clauses(parts))
+    return Sentence("%(name)s: %(move)s", name=required.name, move=move) if required.name else move
+
+
+def _orient_range(axis: _Axis, bounds: tuple[float, float]) -> tuple[_Direction, float, float]:
+    """Return the direction of a range, with a negative range as a positive one."""
     minimum, maximum = bounds
-    return (negative, -maximum, -minimum) if maximum <= 0 and minimum < 0 else (positive, minimum, maximum)
+    return (axis.negative, -maximum, -minimum) if maximum <= 0 and minimum < 0 else (axis.positive, minimum, maximum)
 
 
-def describe_range(minimum: float, maximum: float, unit: str) -> str:
+def _describe_range(minimum: float, maximum: float, unit: str) -> str:
     """Return a range as ``85 to 95°``, ``at least 100 mm`` or ``1 s``."""
     if maximum >= _NO_BOUND:
-        return f"at least {minimum:g}{unit}"
-    return f"{minimum:g}{unit}" if minimum == maximum else f"{minimum:g} to {maximum:g}{unit}"
+        return Sentence("at least %(amount)s", amount=f"{minimum:g}{unit}")
+    if minimum == maximum:
+        return f"{minimum:g}{unit}"
+    return Sentence("%(least)s to %(most)s", least=f"{minimum:g}", most=f"{maximum:g}{unit}")
 
 
 def format_number(value: float) -> str:
@@ -151,11 +245,11 @@ def format_number(value: float) -> str:
 def build_move_measures(move: Move, name: str) -> tuple[Measure, ...]:
     """Return the measures of a move, named ``move 2 forward`` and so on."""
     return (
-        Measure(f"{name} forward", move.forward, "mm"),
-        Measure(f"{name} sideways", move.sideways, "mm"),
-        Measure(f"{name} distance", move.distance, "mm"),
-        Measure(f"{name} turn", move.turn, "°"),
-        Measure(f"{name} seconds", move.seconds, "s"),
+        Measure(Sentence("%(move)s forward", move=name), move.forward, "mm"),
+        Measure(Sentence("%(move)s sideways", move=name), move.sideways, "mm"),
+        Measure(Sentence("%(move)s distance", move=name), move.distance, "mm"),
+        Measure(Sentence("%(move)s turn", move=name), move.turn, "°"),
+        Measure(Sentence("%(move)s seconds", move=name), move.seconds, "s"),
     )
 
 
