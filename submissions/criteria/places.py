@@ -67,25 +67,6 @@ class Area(StrictTable):
             raise ValueError("has a polygon of fewer than three corners, expected [[x, y], [x, y], [x, y], ...]")
         return self
 
-    def __str__(self) -> str:
-        """Return ``the red circle``, ``the outside of the red circle``, or the shape with its dimensions."""
-        return f"the outside of {self._describe_shape()}" if self.outside else self._describe_shape()
-
-    def _describe_shape(self) -> str:
-        if self.name:
-            return self.name
-        if self.rectangle is not None:
-            left, bottom, right, top = self.rectangle
-            return f"the rectangle with x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
-        if self.circle is not None:
-            x, y, radius = self.circle
-            return f"the circle of {radius:g} mm around ({x:g}, {y:g})"
-        if self.bar is not None:
-            x1, y1, x2, y2, _ = self.bar
-            return f"the bar from ({x1:g}, {y1:g}) to ({x2:g}, {y2:g})"
-        corner = (self.polygon or ((0.0, 0.0),))[0]
-        return f"the area with a corner at ({corner[0]:g}, {corner[1]:g})"
-
 
 class LineToFollow(StrictTable):
     """A line to drive along, with its direction.

@@ -14,7 +14,7 @@ import numpy as np
 
 from service.grading.findings import ReportedFault
 from service.grading.grade import Measure, TrialResult
-from service.grading.judging.geometry import measure_area_distance
+from service.grading.judging.geometry import describe_area, measure_area_distance
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import describe_fault, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
@@ -126,7 +126,9 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
                 )
             )
             return fail_with(
-                Sentence(template, count=len(gaps), area=str(nearest_area), pose=pose_text, distance=min(gaps)),
+                Sentence(
+                    template, count=len(gaps), area=describe_area(nearest_area), pose=pose_text, distance=min(gaps)
+                ),
                 t,
                 end,
                 measures=measures,

@@ -17,6 +17,7 @@ from sim.light_sensors import Footprint, compute_footprint
 from sim.recording import Floats, Pose, Recording
 from sim.recording_values import get_pose_after, get_pose_at, get_recorded_robot, tick_to_seconds
 from sim.robot import LightSensor
+from sim.sentences import Sentence
 from sim.trigonometry import sincos
 from submissions.criteria.places import Area, LineToFollow, Part, Zone
 
@@ -150,7 +151,30 @@ def is_in_zone(point: tuple[float, float], zone: Zone, margin: float = 0.0) -> b
 def describe_zone(zone: Zone) -> str:
     """Return the zone as ``x from 0 to 100 and y from 20 to 80``."""
     left, bottom, right, top = zone
-    return f"x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
+    return Sentence(
+        "x from %(left)g to %(right)g and y from %(bottom)g to %(top)g", left=left, right=right, bottom=bottom, top=top
+    )
+
+
+def describe_area(area: Area) -> str:
+    """Return ``the red circle``, ``the outside of the red circle``, or the shape with its dimensions."""
+    shape = _describe_shape(area)
+    return Sentence("the outside of %(area)s", area=shape) if area.outside else shape
+
+
+def _describe_shape(area: Area) -> str:
+    if area.name:
+        return area.name
+    if area.rectangle is not None:
+        return Sentence("the rectangle with %(zone)s", zone=describe_zone(area.rectangle))
+    if area.circle is not None:
+        x, y, radius = area.circle
+        return Sentence("the circle of %(radius)g mm around (%(x)g, %(y)g)", radius=radius, x=x, y=y)
+    if area.bar is not None:
+        x1, y1, x2, y2, _ = area.bar
+        return Sentence("the bar from (%(x1)g, %(y1)g) to (%(x2)g, %(y2)g)", x1=x1, y1=y1, x2=x2, y2=y2)
+    x, y = (area.polygon or ((0.0, 0.0),))[0]
+    return Sentence("the area with a corner at (%(x)g, %(y)g)", x=x, y=y)
 
 
 def measure_area_distance(area: Area, points: Floats) -> Floats:

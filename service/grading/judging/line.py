@@ -20,21 +20,29 @@ from service.grading.judging.geometry import (
 )
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
-from service.grading.judging.path import PART_NAMES
+from service.grading.judging.path import describe_part
+from service.language import translatable
 from sim.recording import Floats
 from sim.recording_values import tick_to_seconds
+from sim.sentences import Sentence
 from submissions.criteria.line import Follows, Laps
+from submissions.criteria.places import LineToFollow
 
 
 @declare_judge(Follows)
 def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
     """Judge the fraction of the line that was driven along, of the part that counts."""
     recording = trial.recording
-    part_name, line = PART_NAMES[criterion.of], criterion.line.name
+    part_name, line = describe_part(criterion.of), _describe_line(criterion.line)
     line_progress = track_line_progress(criterion.line, compute_positions(recording, criterion.of), criterion.within)
     if line_progress is None:
         return fail_with(
-            f"Expected {part_name} to follow {line}, but it never came within {criterion.within:g} mm of it.",
+            Sentence(
+                "Expected %(part)s to follow %(line)s, but it never came within %(limit)g mm of it.",
+                part=part_name,
+                line=line,
+                limit=criterion.within,
+            ),
             recording.end_t,
             recording.end,
         )
@@ -45,49 +53,83 @@ def judge_follows(criterion: Follows, trial: TrialResult) -> Outcome:
     farthest_row = int(np.argmax(offsets))
     one_side = _measure_one_side_share(line_progress.offset[:row_count])
     measures = (
-        Measure("share covered", share),
-        Measure("farthest off", float(offsets[farthest_row]), "mm"),
-        Measure("mean off", float(offsets.mean()), "mm"),
-        Measure("seconds to the end", tick_to_seconds(recording, line_progress.first + row_count - 1), "s"),
-        Measure("share on one side", one_side),
+        Measure(Sentence("share covered"), share),
+        Measure(Sentence("farthest off"), float(offsets[farthest_row]), "mm"),
+        Measure(Sentence("mean off"), float(offsets.mean()), "mm"),
+        Measure(Sentence("seconds to the end"), tick_to_seconds(recording, line_progress.first + row_count - 1), "s"),
+        Measure(Sentence("share on one side"), one_side),
     )
     score = Fraction(min(share / criterion.covers, 1.0)).limit_denominator(1000)
     if criterion.at_most is not None and offsets[farthest_row] > criterion.at_most:
         return fail_with(
-            f"Expected {part_name} to stay within {criterion.at_most:g} mm of {line}, "
-            f"but it was {offsets[farthest_row]:.0f} mm off.",
+            Sentence(
+                "Expected %(part)s to stay within %(limit)g mm of %(line)s, but it was %(distance).0f mm off.",
+                part=part_name,
+                limit=criterion.at_most,
+                line=line,
+                distance=float(offsets[farthest_row]),
+            ),
             *find_place(recording, line_progress.first + farthest_row),
             score=score,
             measures=measures,
         )
     if share < criterion.covers - 1e-9:
         start_position = float(line_progress.progress[0])
-        late_clause = (
-            f"reached it only at {start_position / line_progress.length:.0%} of its length, and "
+        template = (
+            translatable(
+                "Expected %(part)s to follow %(expected)s of %(line)s within %(limit)g mm, but it reached it only at "
+                "%(start)s of its length, and followed %(share)s of it."
+            )
             if start_position > start
-            else ""
+            else translatable(
+                "Expected %(part)s to follow %(expected)s of %(line)s within %(limit)g mm, but it followed %(share)s "
+                "of it."
+            )
         )
         return fail_with(
-            f"Expected {part_name} to follow {criterion.covers:.0%} of {line} within {criterion.within:g} mm, "
-            f"but it {late_clause}followed {share:.0%} of it.",
+            Sentence(
+                template,
+                part=part_name,
+                expected=f"{criterion.covers:.0%}",
+                line=line,
+                limit=criterion.within,
+                start=f"{start_position / line_progress.length:.0%}",
+                share=f"{share:.0%}",
+            ),
             *find_place(recording, line_progress.first + _find_last_on_line(line_progress, criterion.within)),
             score=score,
             measures=measures,
         )
     if criterion.one_side is not None and one_side < criterion.one_side - 1e-9:
         return fail_with(
-            f"Expected {part_name} to stay on one side of {line} for {criterion.one_side:.0%} of the time, "
-            f"but it was on its main side for {one_side:.0%}.",
+            Sentence(
+                "Expected %(part)s to stay on one side of %(line)s for %(expected)s of the time, but it was on its "
+                "main side for %(share)s.",
+                part=part_name,
+                line=line,
+                expected=f"{criterion.one_side:.0%}",
+                share=f"{one_side:.0%}",
+            ),
             *find_place(recording, line_progress.first + row_count - 1),
             score=score,
             measures=measures,
         )
     return pass_with(
-        f"{part_name[:1].upper()}{part_name[1:]} followed {share:.0%} of {line}, never more than "
-        f"{offsets[farthest_row]:.0f} mm off.",
+        Sentence(
+            "%(part)s followed %(share)s of %(line)s, never more than %(distance).0f mm off.",
+            part=describe_part(criterion.of, capitalised=True),
+            share=f"{share:.0%}",
+            line=line,
+            distance=float(offsets[farthest_row]),
+        ),
         *find_place(recording, line_progress.first + row_count - 1),
         measures,
     )
+
+
+def _describe_line(line: LineToFollow) -> str:
+    """Return the name of a line; the name of a line without its own can be translated."""
+    return line.name if "name" in line.model_fields_set else Sentence("the line")
 
 
 def _find_counted_range(criterion: Follows, line_progress: LineProgress) -> tuple[float, float]:
@@ -115,8 +157,11 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
     line_progress = track_line_progress(criterion.line, points, criterion.within)
     if line_progress is None:
         return fail_with(
-            f"Expected the robot to drive along {criterion.line.name}, but it never came within "
-            f"{criterion.within:g} mm of it.",
+            Sentence(
+                "Expected the robot to drive along %(line)s, but it never came within %(limit)g mm of it.",
+                line=_describe_line(criterion.line),
+                limit=criterion.within,
+            ),
             recording.end_t,
             recording.end,
         )
@@ -125,25 +170,44 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
     max_offset = float(np.abs(line_progress.offset[: _find_last_row(line_progress, crossings)]).max())
     driven_length = float(line_progress.progress.max() - line_progress.progress[0])
     measures = (
-        *([Measure("lap time", min(lap.seconds for lap in complete.laps), "s")] if complete.laps else []),
-        Measure("laps", complete.count),
-        Measure("farthest off", max_offset, "mm"),
-        Measure("part of a lap", driven_length / line_progress.length),
+        *([Measure(Sentence("lap time"), min(lap.seconds for lap in complete.laps), "s")] if complete.laps else []),
+        Measure(Sentence("laps"), complete.count),
+        Measure(Sentence("farthest off"), max_offset, "mm"),
+        Measure(Sentence("part of a lap"), driven_length / line_progress.length),
     )
     score = Fraction(min(max(driven_length / line_progress.length, 0.0) / criterion.laps, 1.0)).limit_denominator(1000)
     if complete.count < criterion.laps:
         if complete.spoilt_row is not None:
             return fail_with(
-                f"Expected {_describe_laps(criterion.laps)} within {criterion.within:g} mm of {criterion.line.name}, "
-                f"but the robot was {abs(line_progress.offset[complete.spoilt_row]):.0f} mm off it.",
+                Sentence(
+                    "Expected %(laps)s within %(limit)g mm of %(line)s, but the robot was %(distance).0f mm off it.",
+                    laps=_describe_laps(criterion.laps),
+                    limit=criterion.within,
+                    line=_describe_line(criterion.line),
+                    distance=float(abs(line_progress.offset[complete.spoilt_row])),
+                ),
                 *find_place(recording, line_progress.first + complete.spoilt_row),
                 score=score,
                 measures=measures,
             )
+        template = (
+            translatable(
+                "Expected %(laps)s from start line to start line, but the robot drove %(share)s of a lap and crossed "
+                "the start line %(count)s time."
+            )
+            if len(crossings) == 1
+            else translatable(
+                "Expected %(laps)s from start line to start line, but the robot drove %(share)s of a lap and crossed "
+                "the start line %(count)s times."
+            )
+        )
         return fail_with(
-            f"Expected {_describe_laps(criterion.laps)} from start line to start line, but the robot drove "
-            f"{max(driven_length, 0) / line_progress.length:.0%} of a lap and crossed the start line "
-            f"{len(crossings)} time{'' if len(crossings) == 1 else 's'}.",
+            Sentence(
+                template,
+                laps=_describe_laps(criterion.laps),
+                share=f"{max(driven_length, 0) / line_progress.length:.0%}",
+                count=len(crossings),
+            ),
             recording.end_t,
             recording.end,
             score=score,
@@ -152,21 +216,26 @@ def judge_laps(criterion: Laps, trial: TrialResult) -> Outcome:
     best = min(complete.laps, key=lambda lap: (lap.seconds, lap.end_row))
     if criterion.seconds is not None and not criterion.seconds[0] <= best.seconds <= criterion.seconds[1]:
         return fail_with(
-            f"Expected a lap in {criterion.seconds[0]:g} to {criterion.seconds[1]:g} s, "
-            f"but the best took {best.seconds:.2f} s.",
+            Sentence(
+                "Expected a lap in %(least)g to %(most)g s, but the best took %(seconds).2f s.",
+                least=criterion.seconds[0],
+                most=criterion.seconds[1],
+                seconds=best.seconds,
+            ),
             *find_place(recording, best.end_row),
             score=score,
             measures=measures,
         )
-    return pass_with(
-        f"The robot drove {_describe_laps(complete.count)}, the best in {best.seconds:.2f} s.",
-        *find_place(recording, best.end_row),
-        measures,
+    message = Sentence(
+        "The robot drove %(laps)s, the best in %(seconds).2f s.",
+        laps=_describe_laps(complete.count),
+        seconds=best.seconds,
     )
+    return pass_with(message, *find_place(recording, best.end_row), measures)
 
 
 def _describe_laps(count: int) -> str:
-    return "a whole lap" if count == 1 else f"{count} whole laps"
+    return Sentence("a whole lap") if count == 1 else Sentence("%(count)s whole laps", count=count)
 
 
 def _find_crossings(criterion: Laps, points: Floats, line_progress: LineProgress, per_second: float) -> list[Crossing]:
