@@ -5,6 +5,7 @@ A grade's columns contain English texts. One column lists the templates and valu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -46,7 +47,7 @@ def _encode_value(value: object) -> object:
             return {"sentence": _encode_sentence(value)}
         case str() | bool() | int() | None:
             return value
-        case float():
+        case float() if math.isfinite(value):  # JSON has no others
             return float(value)  # numpy's floats too
     return str(value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -97,12 +98,22 @@ def test_sentences_of_a_stored_grade_can_be_translated(store: Store, sentence: s
     assert back.hints[1] == "plain"
 
 
-def test_a_sentence_whose_format_a_stored_value_does_not_fit_is_stored_as_text(store: Store) -> None:
-    grade = replace(report_builders.shape_grade(), hints=(Sentence("%(marks).1f marks", marks=Decimal("1.5")),))
+@pytest.mark.parametrize(
+    ("sentence", "text"),
+    [
+        (Sentence("%(marks).1f marks", marks=Decimal("1.5")), "1.5 marks"),
+        (Sentence("%(distance).0f mm", distance=math.nan), "nan mm"),
+        (Sentence("The value was %(value)s.", value=Sentence("%(number)g", number=math.inf)), "The value was inf."),
+    ],
+)
+def test_a_sentence_whose_format_a_stored_value_does_not_fit_is_stored_as_text(
+    store: Store, sentence: str, text: str
+) -> None:
+    grade = replace(report_builders.shape_grade(), hints=(sentence,))
     job_id = _stored(store, grade)
     with store.reading() as session:
         (hint,) = results.load_grade(session, job_id).hints
-    assert (hint, type(hint)) == ("1.5 marks", str)
+    assert (hint, type(hint)) == (text, str)
 
 
 def test_what_it_cost_is_kept_and_told_of_no_two_grades_apart(store: Store) -> None:
