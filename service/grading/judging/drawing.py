@@ -26,7 +26,9 @@ from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list
 from service.grading.judging.moves import compute_straight_mask
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.language import translatable
 from sim.recording import Floats, Recording
+from sim.sentences import Sentence
 from submissions.criteria.drawing import Drawing
 
 #: Two straight parts whose directions differ by less than this may be one leg, degrees.
@@ -98,7 +100,7 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     recording = trial.recording
     if criterion.pen and not compute_pen_mask(recording).any():
         return fail_with(
-            "Expected something to be drawn, but the pen was never down: the program's magic line has no -p.",
+            Sentence("Expected something to be drawn, but the pen was never down: the program's magic line has no -p."),
             0.0,
             recording.start,
         )
@@ -114,10 +116,14 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     score = Fraction(right_count, criterion.figure_count)
     if not is_complete:
         lengths = ", ".join(f"{leg.length:.0f}" for leg in legs[:12])
-        lengths_text = f"{len(legs)}, of {lengths} mm" if legs else "none"
+        template = (
+            translatable("Expected %(figures)s, but the path has %(count)s, of %(lengths)s mm.")
+            if legs
+            else translatable("Expected %(figures)s, but the path has none.")
+        )
         row = legs[min(leg_count, len(legs)) - 1].last if legs else 0
         return fail_with(
-            f"Expected {_describe_figures(criterion)}, but the path has {lengths_text}.",
+            Sentence(template, figures=_describe_figures(criterion), count=len(legs), lengths=lengths),
             *find_place(recording, row),
             score=score / 2,
             measures=measures,
@@ -125,19 +131,26 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
     problem = next((problem for problem in problems if problem is not None), None)
     if problem is not None:
         moment = find_place(recording, problem.row)
-        return fail_with(problem.words, *moment, score=score, measures=measures, findings=problem.findings)
+        return fail_with(problem.message, *moment, score=score, measures=measures, findings=problem.findings)
     means = [_compute_mean_length(figure) for figure in figures]
     if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
         number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
         return fail_with(
-            f"Expected each figure to be larger than the one before, but after legs of {means[number]:.0f} mm came "
-            f"legs of {means[number + 1]:.0f} mm.",
+            Sentence(
+                "Expected each figure to be larger than the one before, but after legs of %(before).0f mm came legs "
+                "of %(after).0f mm.",
+                before=means[number],
+                after=means[number + 1],
+            ),
             *find_place(recording, figures[number + 1][-1].last),
             measures=measures,
         )
-    lengths_text = ", ".join(f"{mean:.0f}" for mean in means)
     return pass_with(
-        f"The path has {len(legs)} straight legs as expected, of {lengths_text} mm.",
+        Sentence(
+            "The path has %(count)s straight legs as expected, of %(lengths)s mm.",
+            count=len(legs),
+            lengths=", ".join(f"{mean:.0f}" for mean in means),
+        ),
         *find_place(recording, legs[-1].last),
         measures,
     )
@@ -160,36 +173,63 @@ def _group_figures(criterion: Drawing, legs: Sequence[Leg]) -> tuple[list[Sequen
 class _Problem:
     """A problem with a figure, and the row where it appears."""
 
-    words: str
+    message: str
     row: int
     findings: tuple[OtherTurn, ...] = ()
 
 
 def _describe_figures(criterion: Drawing) -> str:
     if isinstance(criterion.legs, tuple):
-        return f"figures of {quote_list(tuple(map(str, criterion.legs)))} straight legs ({sum(criterion.legs)} in all)"
-    legs = f"{criterion.legs} straight leg{'' if criterion.legs == 1 else 's'}"
-    prefix = "at least " if criterion.at_least else ""
+        return Sentence(
+            "figures of %(counts)s straight legs (%(total)s in all)",
+            counts=quote_list(tuple(map(str, criterion.legs))),
+            total=sum(criterion.legs),
+        )
+    legs = Sentence("%(count)s straight legs", count=criterion.legs)
+    if criterion.legs == 1:
+        legs = Sentence("%(count)s straight leg", count=1)
     if criterion.figure_count == 1:
-        return f"{prefix}one figure of {legs}" if prefix else legs
-    return f"{prefix}{criterion.figure_count} figures of {legs} ({criterion.figure_count * criterion.legs} in all)"
+        return Sentence("at least one figure of %(legs)s", legs=legs) if criterion.at_least else legs
+    template = (
+        translatable("at least %(count)s figures of %(legs)s (%(total)s in all)")
+        if criterion.at_least
+        else translatable("%(count)s figures of %(legs)s (%(total)s in all)")
+    )
+    count = criterion.figure_count
+    return Sentence(template, count=count, legs=legs, total=count * criterion.legs)
+
+
+def _describe_leg(criterion: Drawing, figure: int, leg: int) -> str:
+    """Return ``leg 2``, or with several figures ``leg 2 of figure 1``, from the numbers of both."""
+    if criterion.figure_count == 1:
+        return Sentence("leg %(number)s", number=leg)
+    return Sentence("leg %(number)s of figure %(figure)s", number=leg, figure=figure)
 
 
 def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Problem | None:
     """Return the first problem with the figure, or None."""
     mean = _compute_mean_length(figure)
-    figure_clause = f" of figure {number + 1}" if criterion.figure_count > 1 else ""
     for leg_number, leg in enumerate(figure, 1):
         if leg.length < criterion.shortest:
             return _Problem(
-                f"Expected each leg to be {criterion.shortest:g} mm or longer, but leg {leg_number}{figure_clause} has "
-                f"{leg.length:.0f} mm.",
+                Sentence(
+                    "Expected each leg to be %(shortest)g mm or longer, but %(leg)s has %(length).0f mm.",
+                    shortest=criterion.shortest,
+                    leg=_describe_leg(criterion, number + 1, leg_number),
+                    length=leg.length,
+                ),
                 leg.last,
             )
         if abs(leg.length - mean) > criterion.equal_within * mean:
             return _Problem(
-                f"Expected equal legs (within {criterion.equal_within:.0%} of their mean, {mean:.0f} mm), "
-                f"but leg {leg_number}{figure_clause} has {leg.length:.0f} mm.",
+                Sentence(
+                    "Expected equal legs (within %(tolerance)s of their mean, %(mean).0f mm), but %(leg)s has "
+                    "%(length).0f mm.",
+                    tolerance=f"{criterion.equal_within:.0%}",
+                    mean=mean,
+                    leg=_describe_leg(criterion, number + 1, leg_number),
+                    length=leg.length,
+                ),
                 leg.last,
             )
     for leg_number, (previous, following) in enumerate(itertools.pairwise(figure), 1):
@@ -197,8 +237,14 @@ def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Pr
         required_angle = criterion.angle_of_each[min(number, len(criterion.angle_of_each) - 1)]
         if abs(angle - required_angle) > criterion.angle_within:
             return _Problem(
-                f"Expected a turn of {required_angle:g}° (within {criterion.angle_within:g}°) after each leg, "
-                f"but after leg {leg_number}{figure_clause} the robot turned {angle:.1f}°.",
+                Sentence(
+                    "Expected a turn of %(expected)g° (within %(tolerance)g°) after each leg, but after %(leg)s the "
+                    "robot turned %(angle).1f°.",
+                    expected=required_angle,
+                    tolerance=criterion.angle_within,
+                    leg=_describe_leg(criterion, number + 1, leg_number),
+                    angle=angle,
+                ),
                 following.first,
                 (OtherTurn(angle),),
             )
@@ -206,16 +252,32 @@ def _find_problem(criterion: Drawing, number: int, figure: Sequence[Leg]) -> _Pr
         gap = math.dist(figure[0].start, figure[-1].end)
         max_gap = max(criterion.closes_within, mean / 10)
         if gap > max_gap:
+            template = (
+                translatable(
+                    "Expected the figure to end within %(limit).0f mm of where it began, but the end is %(gap).0f mm "
+                    "away."
+                )
+                if criterion.figure_count == 1
+                else translatable(
+                    "Expected the figure to end within %(limit).0f mm of where it began, but the end of figure "
+                    "%(number)s is %(gap).0f mm away."
+                )
+            )
             return _Problem(
-                f"Expected the figure to end within {max_gap:.0f} mm of where it began, "
-                f"but the end{figure_clause} is {gap:.0f} mm away.",
+                Sentence(template, limit=max_gap, gap=gap, number=number + 1),
                 figure[-1].last,
             )
     if number < len(criterion.sizes):
         low, high = criterion.sizes[number]
         if not low <= mean <= high:
             return _Problem(
-                f"Expected legs of {low:g} to {high:g} mm in figure {number + 1}, but they have {mean:.0f} mm.",
+                Sentence(
+                    "Expected legs of %(least)g to %(most)g mm in figure %(number)s, but they have %(mean).0f mm.",
+                    least=low,
+                    most=high,
+                    number=number + 1,
+                    mean=mean,
+                ),
                 figure[-1].last,
             )
     return None
@@ -226,14 +288,20 @@ def _compute_mean_length(figure: Sequence[Leg]) -> float:
 
 
 def _build_measures(legs: Sequence[Leg]) -> tuple[Measure, ...]:
-    figures = [Measure("legs", len(legs))]
-    figures += [Measure(f"leg {number}", leg.length, "mm") for number, leg in enumerate(legs[:12], 1)]
+    figures = [Measure(Sentence("legs"), len(legs))]
     figures += [
-        Measure(f"corner {number}", abs(compute_turn_angle(before.direction, after.direction)), "°")
+        Measure(Sentence("leg %(number)s", number=number), leg.length, "mm") for number, leg in enumerate(legs[:12], 1)
+    ]
+    figures += [
+        Measure(
+            Sentence("corner %(number)s", number=number),
+            abs(compute_turn_angle(before.direction, after.direction)),
+            "°",
+        )
         for number, (before, after) in enumerate(itertools.pairwise(legs), 1)
     ]
     if legs:
-        figures.append(Measure("from start to end", math.dist(legs[0].start, legs[-1].end), "mm"))
+        figures.append(Measure(Sentence("from start to end"), math.dist(legs[0].start, legs[-1].end), "mm"))
     return tuple(figures)
 
 

@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from types import MappingProxyType
 
 import numpy as np
 
@@ -27,12 +28,28 @@ from service.grading.judging.judge_declaration import (
     judge_by_trial,
     summarise_trials,
 )
+from service.grading.judging.message_parts import join_clauses
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.language import translatable
 from sim.recording import Floats, Recording
+from sim.sentences import Sentence
 from submissions.criteria.point import Circuits, Closest, Spread
 
 _RAY_LENGTH = 10_000.0
 _TURN = 2.0
+#: By the required direction of the first turn: the problem with a turn in the other direction, and with no turn.
+_TURN_PROBLEMS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "towards": (
+            translatable("Expected the robot first to turn towards %(point)s, but it turned away from it."),
+            translatable("Expected the robot first to turn towards %(point)s, but it did not turn at all."),
+        ),
+        "away": (
+            translatable("Expected the robot first to turn away from %(point)s, but it turned towards it."),
+            translatable("Expected the robot first to turn away from %(point)s, but it did not turn at all."),
+        ),
+    }
+)
 
 
 @declare_judge(Closest)
@@ -43,44 +60,62 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
     nearest = _find_nearest(np.hypot(points[:, 0] - criterion.x, points[:, 1] - criterion.y))
     row, min_distance = nearest if nearest else (0, math.nan)
     straight_distance = _measure_straight_distance(recording, criterion.x, criterion.y)
-    measures = (Measure("least distance", min_distance, "mm"), Measure("straight on", straight_distance, "mm"))
-    point = f"({criterion.x:g}, {criterion.y:g})"
+    measures = (
+        Measure(Sentence("least distance"), min_distance, "mm"),
+        Measure(Sentence("straight on"), straight_distance, "mm"),
+    )
+    point = _format_point(criterion)
     moment = find_place(recording, row)
     if criterion.first_turn is not None:
         first_turn = _find_first_turn(recording, criterion.x, criterion.y)
         if first_turn is None or (first_turn[1] == "towards") != (criterion.first_turn == "towards"):
-            behaviour = (
-                "it did not turn at all" if first_turn is None else f"it turned {_describe_direction(first_turn[1])} it"
-            )
-            expectation = f"Expected the robot first to turn {_describe_direction(criterion.first_turn)}"
+            other_turn, no_turn = _TURN_PROBLEMS[criterion.first_turn]
             return fail_with(
-                f"{expectation} {point}, but {behaviour}.",
+                Sentence(other_turn if first_turn else no_turn, point=point),
                 *find_place(recording, first_turn[0] if first_turn else 0),
                 measures=measures,
             )
     if criterion.distance is not None and not criterion.distance[0] <= min_distance <= criterion.distance[1]:
         low, high = criterion.distance
         return fail_with(
-            f"Expected the robot's smallest distance to {point} to be {low:g} to {high:g} mm, but it was "
-            f"{min_distance:.0f} mm.",
+            Sentence(
+                "Expected the robot's smallest distance to %(point)s to be %(least)g to %(most)g mm, but it was "
+                "%(distance).0f mm.",
+                point=point,
+                least=low,
+                most=high,
+                distance=min_distance,
+            ),
             *moment,
             measures=measures,
         )
     if criterion.than_straight is not None and (min_distance < straight_distance) != (
         criterion.than_straight == "nearer"
     ):
-        requirement = "come nearer to" if criterion.than_straight == "nearer" else "stay farther from"
+        template = (
+            translatable(
+                "Expected the robot to come nearer to %(point)s than by driving straight on (%(straight).0f mm), but "
+                "its smallest distance was %(distance).0f mm."
+            )
+            if criterion.than_straight == "nearer"
+            else translatable(
+                "Expected the robot to stay farther from %(point)s than by driving straight on (%(straight).0f mm), "
+                "but its smallest distance was %(distance).0f mm."
+            )
+        )
         return fail_with(
-            f"Expected the robot to {requirement} {point} than by driving straight on ({straight_distance:.0f} mm), "
-            f"but its smallest distance was {min_distance:.0f} mm.",
+            Sentence(template, point=point, straight=straight_distance, distance=min_distance),
             *moment,
             measures=measures,
         )
-    return pass_with(f"The robot's smallest distance to {point} was {min_distance:.0f} mm.", *moment, measures)
+    message = Sentence(
+        "The robot's smallest distance to %(point)s was %(distance).0f mm.", point=point, distance=min_distance
+    )
+    return pass_with(message, *moment, measures)
 
 
-def _describe_direction(direction: str) -> str:
-    return "towards" if direction == "towards" else "away from"
+def _format_point(criterion: Closest | Circuits | Spread) -> str:
+    return f"({criterion.x:g}, {criterion.y:g})"
 
 
 def _find_first_turn(recording: Recording, x: float, y: float) -> tuple[int, str] | None:
@@ -127,25 +162,34 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     recording = trial.recording
     rounds = compute_rounds(compute_positions(recording, criterion.of), criterion.x, criterion.y)
     times = float(abs(rounds[-1])) if len(rounds) else 0.0
-    measures = [Measure("times round", times)]
-    point, end = f"({criterion.x:g}, {criterion.y:g})", (recording.end_t, recording.end)
+    measures = [Measure(Sentence("times round"), times)]
+    point, end = _format_point(criterion), (recording.end_t, recording.end)
     low, high = criterion.times
-    expected_times = f"{low:g} times" if low == high else f"{low:g} to {high:g} times"
-    if high >= _NO_BOUND:
-        expected_times = "at least once" if low == 1 else f"at least {low:g} times"
     if criterion.direction != "either" and times >= 0.5:
         direction = "anticlockwise" if rounds[-1] > 0 else "clockwise"
         if direction != criterion.direction:
+            template = (
+                translatable("Expected the path to go clockwise round %(point)s, but it went anticlockwise.")
+                if direction == "anticlockwise"
+                else translatable("Expected the path to go anticlockwise round %(point)s, but it went clockwise.")
+            )
             return fail_with(
-                f"Expected the path to go {criterion.direction} round {point}, but it went {direction}.",
+                Sentence(template, point=point),
                 *end,
                 measures=tuple(measures),
             )
     if not low <= times <= high:
-        pen_note = "" if len(rounds) else "; the pen was never down, which -p in the program's magic line does"
+        template = (
+            translatable("Expected the path to go %(expected)s round %(point)s, but it went %(times).2f times.")
+            if len(rounds)
+            else translatable(
+                "Expected the path to go %(expected)s round %(point)s, but it went %(times).2f times; the pen was "
+                "never down, which -p in the program's magic line does."
+            )
+        )
         score = Fraction(min(times / low, 1.0) if low else 0.0).limit_denominator(1000)
         return fail_with(
-            f"Expected the path to go {expected_times} round {point}, but it went {times:.2f} times{pen_note}.",
+            Sentence(template, expected=_describe_times(low, high), point=point, times=times),
             *end,
             score=score,
             measures=tuple(measures),
@@ -157,8 +201,13 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
     )
     if min_distance < criterion.clear_of:
         return fail_with(
-            f"Expected the path to keep {criterion.clear_of:g} mm clear of {point}, but its smallest distance was "
-            f"{min_distance:.0f} mm.",
+            Sentence(
+                "Expected the path to keep %(clearance)g mm clear of %(point)s, but its smallest distance was "
+                "%(distance).0f mm.",
+                clearance=criterion.clear_of,
+                point=point,
+                distance=min_distance,
+            ),
             *end,
             measures=tuple(measures),
         )
@@ -166,22 +215,46 @@ def judge_circuits(criterion: Circuits, trial: TrialResult) -> Outcome:
         headings = compute_headings(recording)[first_row : last_row + 1]
         change = float(abs(headings[-1] - headings[0]))
         corners = _count_corners(headings)
-        measures += [Measure(f"gyro in round {number}", change, "°"), Measure(f"corners in round {number}", corners)]
+        measures += [
+            Measure(Sentence("gyro in round %(number)s", number=number), change, "°"),
+            Measure(Sentence("corners in round %(number)s", number=number), corners),
+        ]
         if criterion.gyro is not None and not criterion.gyro[0] <= change <= criterion.gyro[1]:
             return fail_with(
-                f"Expected the gyro to change by {criterion.gyro[0]:g}° to {criterion.gyro[1]:g}° in each round, "
-                f"but in round {number} it changed by {change:.0f}°.",
+                Sentence(
+                    "Expected the gyro to change by %(least)g° to %(most)g° in each round, but in round %(number)s it "
+                    "changed by %(change).0f°.",
+                    least=criterion.gyro[0],
+                    most=criterion.gyro[1],
+                    number=number,
+                    change=change,
+                ),
                 *find_place(recording, last_row),
                 measures=tuple(measures),
             )
         if criterion.corners is not None and corners != criterion.corners:
             return fail_with(
-                f"Expected the gyro to change in {criterion.corners} steps in each round, "
-                f"but in round {number} there were {corners}.",
+                Sentence(
+                    "Expected the gyro to change in %(expected)s steps in each round, but in round %(number)s there "
+                    "were %(count)s.",
+                    expected=criterion.corners,
+                    number=number,
+                    count=corners,
+                ),
                 *find_place(recording, last_row),
                 measures=tuple(measures),
             )
-    return pass_with(f"The path went {times:.2f} times round {point}.", *end, tuple(measures))
+    message = Sentence("The path went %(times).2f times round %(point)s.", times=times, point=point)
+    return pass_with(message, *end, tuple(measures))
+
+
+def _describe_times(least: float, most: float) -> str:
+    """Return the required rounds as ``2 times``, ``1 to 2 times``, ``at least once`` or ``at least 2 times``."""
+    if most >= _NO_BOUND:
+        return Sentence("at least once") if least == 1 else Sentence("at least %(count)g times", count=least)
+    if least == most:
+        return Sentence("%(count)g times", count=least)
+    return Sentence("%(least)g to %(most)g times", least=least, most=most)
 
 
 def compute_rounds(points: Floats, x: float, y: float) -> Floats:
@@ -232,17 +305,23 @@ def _judge_end(criterion: Spread, trial: TrialResult) -> Outcome:
     """Judge the distance of the end from the point, mm."""
     recording = trial.recording
     distance = _measure_end_distance(criterion, trial)
-    measures = (Measure("distance from the target", distance, "mm"),)
-    description = f"ended {distance:.0f} mm from ({criterion.x:g}, {criterion.y:g})"
+    measures = (Measure(Sentence("distance from the target"), distance, "mm"),)
     if criterion.within is not None and not distance <= criterion.within:
         return fail_with(
-            f"Expected the robot to end within {criterion.within:g} mm of ({criterion.x:g}, {criterion.y:g}), "
-            f"but it ended {distance:.0f} mm from it.",
+            Sentence(
+                "Expected the robot to end within %(limit)g mm of %(point)s, but it ended %(distance).0f mm from it.",
+                limit=criterion.within,
+                point=_format_point(criterion),
+                distance=distance,
+            ),
             recording.end_t,
             recording.end,
             measures=measures,
         )
-    return pass_with(f"The robot {description}.", recording.end_t, recording.end, measures)
+    message = Sentence(
+        "The robot ended %(distance).0f mm from %(point)s.", distance=distance, point=_format_point(criterion)
+    )
+    return pass_with(message, recording.end_t, recording.end, measures)
 
 
 def _describe_spread(criterion: Spread, trials: Sequence[TrialResult]) -> str:
@@ -251,12 +330,28 @@ def _describe_spread(criterion: Spread, trials: Sequence[TrialResult]) -> str:
     descriptions = []
     for level in levels:
         distances = [_measure_end_distance(criterion, trial) for trial in trials if trial.motor_noise == level]
-        mean = sum(distances) / len(distances)
-        descriptions.append(
-            f"with motor noise {level:g} {min(distances):.0f} to {max(distances):.0f} mm (mean {mean:.0f}, "
-            f"{len(distances)} run{'' if len(distances) == 1 else 's'})"
+        template = (
+            translatable("with motor noise %(level)g %(least).0f to %(most).0f mm (mean %(mean).0f, %(count)s run)")
+            if len(distances) == 1
+            else translatable(
+                "with motor noise %(level)g %(least).0f to %(most).0f mm (mean %(mean).0f, %(count)s runs)"
+            )
         )
-    return f"The robot ended at these distances from ({criterion.x:g}, {criterion.y:g}): {'; '.join(descriptions)}."
+        descriptions.append(
+            Sentence(
+                template,
+                level=level,
+                least=min(distances),
+                most=max(distances),
+                mean=sum(distances) / len(distances),
+                count=len(distances),
+            )
+        )
+    return Sentence(
+        "The robot ended at these distances from %(point)s: %(distances)s.",
+        point=_format_point(criterion),
+        distances=join_clauses(descriptions, "; "),
+    )
 
 
 def _measure_end_distance(criterion: Spread, trial: TrialResult) -> float:

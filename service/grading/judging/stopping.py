@@ -6,8 +6,10 @@ A run ends at the last tick that was reached. Motors left on don't move the robo
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -23,11 +25,20 @@ from service.grading.judging.geometry import (
 )
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.outcome import Outcome, fail_with, find_ending_fault, pass_with
+from service.language import translatable
 from sim.recording import Recording, Verdict
 from sim.recording_values import tick_to_seconds
+from sim.sentences import Sentence
 from submissions.criteria.stopping import StopOn
 
 Side = Literal["left", "right"]
+_EXPECTATIONS: Mapping[str, str] = MappingProxyType(
+    {
+        "left": translatable("Expected the robot to stop with its left light sensor in place"),
+        "right": translatable("Expected the robot to stop with its right light sensor in place"),
+        "either": translatable("Expected the robot to stop with one of its light sensors in place"),
+    }
+)
 
 
 @declare_judge(StopOn)
@@ -36,13 +47,20 @@ def judge_stop_on(criterion: StopOn, trial: TrialResult) -> Outcome:
     recording = trial.recording
     fault = find_ending_fault(recording)
     if fault is not None and fault.verdict is not Verdict.PROGRAM_ERROR:
-        expectation, end_t = _describe_expected(criterion), recording.end_t
-        message = f"Expected the robot to stop {expectation}, but its program was still running after {end_t:.2f} s."
+        end_t = recording.end_t
+        message = Sentence(
+            "%(expectation)s, but its program was still running after %(seconds).2f s.",
+            expectation=Sentence(_EXPECTATIONS[criterion.sensor]),
+            seconds=end_t,
+        )
         outcome = fail_with(message, end_t, recording.end, findings=(StillRunning(),))
         return replace(outcome, has_end_reason=fault.verdict is Verdict.TIME_LIMIT)
     if not len(recording.ticks):
         return fail_with(
-            f"Expected the robot to stop {_describe_expected(criterion)}, but it never moved: no time passed."
+            Sentence(
+                "%(expectation)s, but it never moved: no time passed.",
+                expectation=Sentence(_EXPECTATIONS[criterion.sensor]),
+            )
         )
     sides: tuple[Side, ...] = ("left", "right") if criterion.sensor == "either" else (criterion.sensor,)
     outcomes = [_judge_side(criterion, side, recording) for side in sides]
@@ -55,21 +73,25 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
     reading = 100 * int(rgb[0]) / 255
     reading_problem: tuple[str, str] | None = None
     checks: list[tuple[bool, str, str]] = []  # whether it holds, the expected value, the actual value
-    position_text = f"at ({position[0]:.1f}, {position[1]:.1f})"
+    position_text = Sentence("at (%(x).1f, %(y).1f)", x=position[0], y=position[1])
     # Everything off the floor is black, so the reading covers only the floor.
     floor_share = 1.0 if criterion.off_floor else measure_floor_share(recording, side, recording.end)
-    floor_note = "" if floor_share == 1 else ", partly beside the floor" if floor_share else ", beside the floor"
     if criterion.zone is not None:
-        checks.append((is_in_zone(position, criterion.zone), f"at {describe_zone(criterion.zone)}", position_text))
+        expectation = Sentence("at %(zone)s", zone=describe_zone(criterion.zone))
+        checks.append((is_in_zone(position, criterion.zone), expectation, position_text))
     if criterion.near is not None:
         distance = math.dist(position, criterion.near)
         x, y = criterion.near
-        expectation = f"within {criterion.within:g} mm of ({x:g}, {y:g})"
-        checks.append((distance <= criterion.within, expectation, f"{position_text}, {distance:.1f} mm away"))
+        expectation = Sentence("within %(limit)g mm of (%(x)g, %(y)g)", limit=criterion.within, x=x, y=y)
+        distance_text = Sentence("%(position)s, %(distance).1f mm away", position=position_text, distance=distance)
+        checks.append((distance <= criterion.within, expectation, distance_text))
     if criterion.reflected is not None:
         minimum, maximum = criterion.reflected
         is_reading_right = floor_share > 0 and minimum <= reading / floor_share <= maximum
-        reading_problem = f"reading {_format_range(minimum, maximum)} %", f"reading {reading:.2f} %{floor_note}"
+        reading_problem = (
+            Sentence("reading %(range)s %%", range=_format_range(minimum, maximum)),
+            _add_floor_note(Sentence("reading %(percent).2f %%", percent=reading), floor_share),
+        )
         checks.append((is_reading_right, *reading_problem))
     if criterion.rgb is not None:
         is_close = floor_share > 0 and all(
@@ -77,34 +99,44 @@ def _judge_side(criterion: StopOn, side: Side, recording: Recording) -> Outcome:
         )
         actual_colour = ", ".join(str(int(part)) for part in rgb)
         colour = ", ".join(f"{part:g}" for part in criterion.rgb)
-        checks.append((is_close, f"over the colour ({colour})", f"over ({actual_colour}){floor_note}"))
+        expectation = Sentence("over the colour (%(colour)s)", colour=colour)
+        colour_text = _add_floor_note(Sentence("over (%(colour)s)", colour=actual_colour), floor_share)
+        checks.append((is_close, expectation, colour_text))
     if criterion.still:
         still_seconds = _measure_still_seconds(recording)
-        checks.append(
-            (
-                still_seconds >= criterion.still,
-                f"standing for {criterion.still:g} s",
-                f"standing for {still_seconds:.2f} s",
-            )
-        )
+        expectation = Sentence("standing for %(seconds)g s", seconds=criterion.still)
+        standing_text = Sentence("standing for %(seconds).2f s", seconds=still_seconds)
+        checks.append((still_seconds >= criterion.still, expectation, standing_text))
     measures = (
-        Measure("end x", recording.end.x, "mm"),
-        Measure("end y", recording.end.y, "mm"),
-        Measure("sensor x", position[0], "mm"),
-        Measure("sensor y", position[1], "mm"),
-        Measure("reading", reading, "%"),
-        Measure("time", recording.end_t, "s"),
+        Measure(Sentence("end x"), recording.end.x, "mm"),
+        Measure(Sentence("end y"), recording.end.y, "mm"),
+        Measure(Sentence("sensor x"), position[0], "mm"),
+        Measure(Sentence("sensor y"), position[1], "mm"),
+        Measure(Sentence("reading"), reading, "%"),
+        Measure(Sentence("time"), recording.end_t, "s"),
     )
     problem = next(((wanted, found) for holds, wanted, found in checks if not holds), None)
     if problem is None:
+        template = (
+            translatable("The robot stopped with its left sensor %(position)s, reading %(percent).2f %%.")
+            if side == "left"
+            else translatable("The robot stopped with its right sensor %(position)s, reading %(percent).2f %%.")
+        )
         return pass_with(
-            f"The robot stopped with its {side} sensor {position_text}, reading {reading:.2f} %.",
+            Sentence(template, position=position_text, percent=reading),
             recording.end_t,
             recording.end,
             measures,
         )
+    template = (
+        translatable("Expected the robot to stop with its left sensor %(expected)s, but the sensor was %(actual)s.")
+        if side == "left"
+        else translatable(
+            "Expected the robot to stop with its right sensor %(expected)s, but the sensor was %(actual)s."
+        )
+    )
     return fail_with(
-        f"Expected the robot to stop with its {side} sensor {problem[0]}, but the sensor was {problem[1]}.",
+        Sentence(template, expected=problem[0], actual=problem[1]),
         recording.end_t,
         recording.end,
         Fraction(sum(holds for holds, _, _ in checks), len(checks)),
@@ -120,13 +152,19 @@ def _measure_still_seconds(recording: Recording) -> float:
     return tick_to_seconds(recording, ticks - 1 - int(moving_ticks[-1]) if len(moving_ticks) else ticks)
 
 
-def _describe_expected(criterion: StopOn) -> str:
-    return (
-        "with one of its light sensors in place"
-        if criterion.sensor == "either"
-        else (f"with its {criterion.sensor} light sensor in place")
+def _add_floor_note(description: str, floor_share: float) -> str:
+    """Return what a sensor sees, with a note if only this fraction of it is floor."""
+    if floor_share == 1:
+        return description
+    template = (
+        translatable("%(description)s, partly beside the floor")
+        if floor_share
+        else translatable("%(description)s, beside the floor")
     )
+    return Sentence(template, description=description)
 
 
 def _format_range(minimum: float, maximum: float) -> str:
-    return f"{minimum:g}" if minimum == maximum else f"{minimum:g} to {maximum:g}"
+    if minimum == maximum:
+        return f"{minimum:g}"
+    return Sentence("%(least)s to %(most)s", least=f"{minimum:g}", most=f"{maximum:g}")
