@@ -14,6 +14,7 @@ from service.grading.judging.judge_declaration import Case, Judge, StaticAnalysi
 from service.grading.judging.outcome import fail_with
 from sim.errors import HostError
 from sim.recording import Verdict
+from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import PART_FILES
@@ -70,5 +71,5 @@ def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
     """Judge one criterion. If a part that it needs was not submitted, it gets no marks."""
     missing_part = case.analysis.missing
     if missing_part in criterion.parts_needed:
-        return judge_once(criterion, fail_with(f"There is no {PART_FILES[missing_part]}."))
+        return judge_once(criterion, fail_with(Sentence("There is no %(file)s.", file=PART_FILES[missing_part])))
     return JUDGES[type(criterion)].judge(criterion, case)

@@ -27,6 +27,7 @@ from service.grading.judging.judge import judge_one, order_criteria, reject_fail
 from service.grading.judging.judge_declaration import Case, StaticAnalysis
 from sim.errors import HostError, RobomarkError
 from sim.recording import Image
+from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 
@@ -191,11 +192,14 @@ class _JudgingProcess:
     def _judge_criterion(self, criterion: Criterion) -> CriterionResult:
         ranked_result = self.results.get(criterion.result_needed or "")
         if ranked_result is not None and ranked_result.unjudged:
-            return _build_unjudged_result(criterion, f"{ranked_result.id}, which it ranks, could not be judged")
+            cause = Sentence("%(criterion)s, which it ranks, could not be judged", criterion=ranked_result.id)
+            return _build_unjudged_result(criterion, cause)
         try:
             return judge_one(criterion, self.case)
         except MemoryError:
-            return _build_unjudged_result(criterion, f"it used more than {self.bounds.memory_bytes >> 20} MB of memory")
+            megabytes = self.bounds.memory_bytes >> 20
+            cause = Sentence("it used more than %(megabytes)s MB of memory", megabytes=megabytes)
+            return _build_unjudged_result(criterion, cause)
         except RobomarkError as error:
             return _build_unjudged_result(criterion, str(error).rstrip(".")[:_MAX_CAUSE_LENGTH])
         except Exception as error:
@@ -329,10 +333,10 @@ def _build_unjudged_result(criterion: Criterion, cause: str) -> CriterionResult:
         title=criterion.title,
         marks=Decimal(0),
         max_marks=criterion.marks,
-        message="This criterion could not be judged. Staff will review it.",
+        message=Sentence("This criterion could not be judged. Staff will review it."),
         visibility=criterion.visibility,
         unjudged=cause,
-        for_staff=f"Could not be judged: {cause}.",
+        for_staff=Sentence("Could not be judged: %(cause)s.", cause=cause),
     )
 
 
@@ -344,11 +348,9 @@ def _find_ending_signal(status: int) -> int:
 def _describe_cause(status: int, bounds: JudgingLimits) -> str:
     signal_number = _find_ending_signal(status)
     if signal_number == signal.SIGPROF:
-        return f"it took more than {bounds.cpu_seconds:.0f} s of computing"
+        return Sentence("it took more than %(seconds).0f s of computing", seconds=bounds.cpu_seconds)
     if signal_number == signal.SIGALRM:
-        return f"it took more than {bounds.seconds:.0f} s"
-    return (
-        f"its process was ended by signal {signal_number}"
-        if signal_number
-        else "its process ended before it was judged"
-    )
+        return Sentence("it took more than %(seconds).0f s", seconds=bounds.seconds)
+    if signal_number:
+        return Sentence("its process was ended by signal %(number)s", number=signal_number)
+    return Sentence("its process ended before it was judged")

@@ -5,7 +5,9 @@ All values come from the simulator. The program's use of them is judged elsewher
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,13 +15,50 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import compute_headings, compute_still_mask, compute_times, compute_travel
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.language import translatable
 from sim.recording import Floats, Recording
+from sim.sentences import Sentence
 from submissions.criteria.relation import Relation, Series
 
 #: The number of moments that are compared pairwise.
 _MAX_MOMENTS = 600
 #: Differences below this fraction of a series' range are ignored.
 _EQUAL_TOLERANCE = 0.05
+_SERIES: Mapping[Series, str] = MappingProxyType(
+    {
+        "time": translatable("time"),
+        "x": translatable("x"),
+        "y": translatable("y"),
+        "heading": translatable("heading"),
+        "speed": translatable("speed"),
+        "turning": translatable("turning"),
+        "left wheel speed": translatable("left wheel speed"),
+        "right wheel speed": translatable("right wheel speed"),
+        "left light": translatable("left light"),
+        "right light": translatable("right light"),
+        "ultrasonic": translatable("ultrasonic"),
+        "gyro": translatable("gyro"),
+    }
+)
+#: By whether the values go with or against the others: the beginning of a failure, and the whole of a success.
+_EXPECTATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "with": (
+            translatable("Expected %(checked)s to be lower where %(reference)s is lower"),
+            translatable(
+                "As expected, %(checked)s was lower where %(reference)s was: true for %(share)s of all pairs of "
+                "moments."
+            ),
+        ),
+        "against": (
+            translatable("Expected %(checked)s to be higher where %(reference)s is lower"),
+            translatable(
+                "As expected, %(checked)s was higher where %(reference)s was: true for %(share)s of all pairs of "
+                "moments."
+            ),
+        ),
+    }
+)
 
 
 @declare_judge(Relation)
@@ -33,10 +72,11 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
         else moving_ticks
     )
     t, end = recording.end_t, recording.end
-    lower = "lower" if criterion.goes == "with" else "higher"
-    expectation = f"Expected {criterion.of} to be {lower} where {criterion.to} is lower"
+    checked, reference = Sentence(_SERIES[criterion.of]), Sentence(_SERIES[criterion.to])
+    failure, success = _EXPECTATIONS[criterion.goes]
+    expectation = Sentence(failure, checked=checked, reference=reference)
     if len(rows) < 2:
-        return fail_with(f"{expectation}, but the robot hardly moved.", t, end)
+        return fail_with(Sentence("%(expectation)s, but the robot hardly moved.", expectation=expectation), t, end)
     checked_values, reference_values = (
         _read_series(criterion.of, recording)[rows],
         _read_series(criterion.to, recording)[rows],
@@ -46,27 +86,40 @@ def judge_relation(criterion: Relation, trial: TrialResult) -> Outcome:
     )
     share = Fraction(agreeing_pairs, differing_pairs) if differing_pairs else Fraction(0)
     measures = (
-        Measure("share of pairs", float(share)),
-        Measure("least", float(checked_values.min())),
-        Measure("most", float(checked_values.max())),
+        Measure(Sentence("share of pairs"), float(share)),
+        Measure(Sentence("least"), float(checked_values.min())),
+        Measure(Sentence("most"), float(checked_values.max())),
     )
-    span = f"it was from {checked_values.min():.3g} to {checked_values.max():.3g} while the robot moved"
+    span = Sentence(
+        "it was from %(least).3g to %(most).3g while the robot moved",
+        least=float(checked_values.min()),
+        most=float(checked_values.max()),
+    )
     if np.ptp(checked_values) < criterion.changes or not differing_pairs:
-        amount_clause = f" by {criterion.changes:g} or more" if criterion.changes else ""
+        template = (
+            translatable("Expected %(checked)s to change with %(reference)s by %(least)g or more, but %(span)s.")
+            if criterion.changes
+            else translatable("Expected %(checked)s to change with %(reference)s, but %(span)s.")
+        )
         return fail_with(
-            f"Expected {criterion.of} to change with {criterion.to}{amount_clause}, but {span}.",
+            Sentence(template, checked=checked, reference=reference, least=criterion.changes, span=span),
             t,
             end,
             measures=measures,
         )
-    result_text = f"true for {float(share):.0%} of all pairs of moments"
+    share_text = f"{float(share):.0%}"
     if share >= Fraction(str(criterion.at_least)):
-        return pass_with(
-            f"As expected, {criterion.of} was {lower} where {criterion.to} was: {result_text}.", t, end, measures
-        )
+        message = Sentence(success, checked=checked, reference=reference, share=share_text)
+        return pass_with(message, t, end, measures)
     return fail_with(
-        f"{expectation} in {criterion.at_least:.0%} or more of all pairs of moments, but this was true for "
-        f"{float(share):.0%}; {span}.",
+        Sentence(
+            "%(expectation)s in %(required)s or more of all pairs of moments, but this was true for %(share)s; "
+            "%(span)s.",
+            expectation=expectation,
+            required=f"{criterion.at_least:.0%}",
+            share=share_text,
+            span=span,
+        ),
         t,
         end,
         share / Fraction(str(criterion.at_least)),

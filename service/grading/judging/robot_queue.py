@@ -12,6 +12,7 @@ from service.grading.judging.message_parts import quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from sim.recording import Message, Recording, TimedText
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence
 from submissions.criteria.texts import Messages
 
 
@@ -46,17 +47,23 @@ def judge_queue_growth(recording: Recording) -> Outcome:
         if message.sender == "robot" and message.text.startswith(PY)
     ]
     received_messages = [(index, message) for index, message in sent_messages if message.delivered is not None]
-    expected = "Expected the robot's queue to grow by one JSON:: message for each PY:: message"
+    expectation = Sentence("Expected the robot's queue to grow by one JSON:: message for each PY:: message")
     if not received_messages:
         unreachable_message = next((message for _, message in sent_messages if is_out_of_reach(message)), None)
         if sent_messages and not unreachable_message:
-            return pass_with("The channel lost every PY:: message by chance, so there were no answers to queue.")
-        reason = (
-            f"the channel lost {quote_text(unreachable_message.text)} ({describe_loss(unreachable_message)})"
-            if unreachable_message
-            else ""
+            return pass_with(
+                Sentence("The channel lost every PY:: message by chance, so there were no answers to queue.")
+            )
+        if not unreachable_message:
+            return fail_with(Sentence("%(expectation)s, but the robot sent no PY:: message.", expectation=expectation))
+        return fail_with(
+            Sentence(
+                "%(expectation)s, but the channel lost %(text)s (%(reason)s).",
+                expectation=expectation,
+                text=quote_text(unreachable_message.text),
+                reason=describe_loss(unreachable_message),
+            )
         )
-        return fail_with(f"{expected}, but {reason or 'the robot sent no PY:: message'}.")
     answers = Answers(recording)
     replies = [(message, _find_reply(answers, index)) for index, message in received_messages]
     arrivals = [reply.delivered for _, reply in replies if reply is not None and is_queued(reply)]
@@ -68,28 +75,45 @@ def judge_queue_growth(recording: Recording) -> Outcome:
     ]
     score = Fraction(len(distinct_texts - {message.text for message, _ in missed_messages}), len(distinct_texts))
     for message, reply in missed_messages:
-        problem = "got no answer" if reply is None else f"was answered with {quote_text(reply.text)}"
-        if reply is not None and reply.delivered is None and reply.note == "undelivered":
-            problem = "got its answer only after the program had ended"
-        if reply is not None and is_out_of_reach(reply):
-            problem = f"was answered and the channel lost the answer ({describe_loss(reply)})"
         return fail_with(
-            f"{expected}, but {quote_text(message.text)} {problem} ({len(arrivals)} of {len(received_messages)} "
-            "in the queue).",
+            Sentence(
+                "%(expectation)s, but %(problem)s (%(count)s of %(total)s in the queue).",
+                expectation=expectation,
+                problem=_describe_missed_message(message, reply),
+                count=len(arrivals),
+                total=len(received_messages),
+            ),
             message.t,
             get_pose_at(recording, message.t),
             score,
         )
     if not arrivals:
-        return pass_with("The channel lost every answer by chance.")
+        return pass_with(Sentence("The channel lost every answer by chance."))
     times = [arrived or 0.0 for arrived in arrivals]
     if times != sorted(times):
-        return fail_with(f"{expected}, but the answers arrived in another order.", times[-1], None, score)
+        problem = Sentence("%(expectation)s, but the answers arrived in another order.", expectation=expectation)
+        return fail_with(problem, times[-1], None, score)
     return pass_with(
-        f"The robot's queue grew by one for each of {len(arrivals)} messages.",
+        Sentence("The robot's queue grew by one for each of %(count)s messages.", count=len(arrivals)),
         times[-1],
         get_pose_at(recording, times[-1]),
     )
+
+
+def _describe_missed_message(message: Message, reply: Message | None) -> str:
+    """Return why the answer to a message is not in the queue, as ``"PY::1" got no answer``."""
+    text = quote_text(message.text)
+    if reply is None:
+        return Sentence("%(text)s got no answer", text=text)
+    if is_out_of_reach(reply):
+        return Sentence(
+            "%(text)s was answered and the channel lost the answer (%(reason)s)",
+            text=text,
+            reason=describe_loss(reply),
+        )
+    if reply.delivered is None and reply.note == "undelivered":
+        return Sentence("%(text)s got its answer only after the program had ended", text=text)
+    return Sentence("%(text)s was answered with %(answer)s", text=text, answer=quote_text(reply.text))
 
 
 def _find_reply(answers: Answers, index: int) -> Message | None:

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 
 from service.grading.findings import ExtraText, HurriedSpeech, OtherWord
 from service.grading.grade import Measure, TrialResult
@@ -15,11 +17,46 @@ from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.grading.judging.text_tokens import compute_speech_ends, split_words
+from service.language import translatable
 from sim.recording import Recording, TimedText
 from sim.recording_values import get_pose_at
+from sim.sentences import Sentence
 from submissions.criteria.sequence import WordSequence
 
 _SPEECH_ROUNDING = 0.011  # a waiting program checks every 10 ms
+
+
+@dataclass(frozen=True, slots=True)
+class _Wording:
+    """Templates of messages about what was said, or about what was printed."""
+
+    expected: str
+    nothing: str
+    extra: str
+    success: str
+    repeats: str
+
+
+_WORDINGS: Mapping[str, _Wording] = MappingProxyType(
+    {
+        "speech": _Wording(
+            translatable("Expected the robot to say %(words)s"),
+            translatable("Expected the robot to say %(words)s, but it said nothing."),
+            translatable("Expected the robot to say %(words)s and nothing after it, but it said %(extra)s as well."),
+            translatable("The robot said %(words)s."),
+            translatable("it said these words %(count)s more times"),
+        ),
+        "print": _Wording(
+            translatable("Expected the robot to print %(words)s"),
+            translatable("Expected the robot to print %(words)s, but it printed nothing."),
+            translatable(
+                "Expected the robot to print %(words)s and nothing after it, but it printed %(extra)s as well."
+            ),
+            translatable("The robot printed %(words)s."),
+            translatable("it printed these words %(count)s more times"),
+        ),
+    }
+)
 
 
 @declare_judge(WordSequence)
@@ -27,11 +64,11 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
     """Judge consecutive words in what was said or printed. The best of several beginnings counts."""
     recording = trial.recording
     lines = recording.spoken if criterion.source == "speech" else recording.printed
-    verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
+    wording = _WORDINGS[criterion.source]
     expected_words = [[split_words(text) for text in texts] for texts in criterion.words]
     timed_words = [(word, line) for line in lines for word in split_words(line.text)]
     if not timed_words:
-        return fail_with(f"Expected the robot to {verb} {_format_words(criterion)}, but it {past} nothing.")
+        return fail_with(Sentence(wording.nothing, words=_format_words(criterion)))
     words = [word for word, _ in timed_words]
     start, found_count, end = _find_best_run(criterion, expected_words, words)
     outcome = _judge_best_run(criterion, recording, timed_words, found_count, end)
@@ -41,7 +78,7 @@ def judge_word_sequence(criterion: WordSequence, trial: TrialResult) -> Outcome:
         outcome,
         criterion,
         len(expected_words),
-        Strays(f"it {past} these words {repeat_count} more times", repeat_count),
+        Strays(Sentence(wording.repeats, count=repeat_count), repeat_count),
     )
 
 
@@ -54,19 +91,34 @@ def _judge_best_run(
 ) -> Outcome:
     """Return the outcome of the best run: ``found_count`` words came, and ``end`` is the place of the next word."""
     lines = recording.spoken if criterion.source == "speech" else recording.printed
-    verb, past = ("say", "said") if criterion.source == "speech" else ("print", "printed")
+    wording = _WORDINGS[criterion.source]
     count, expected_text = len(criterion.words), _format_words(criterion)
     reference_line = timed_words[end - 1][1] if found_count else timed_words[0][1]
     if found_count < count:
-        next_clause = f"came {quote_text(timed_words[end][0])}" if end < len(timed_words) else "came nothing"
-        problem = (
-            f"after {_format_alternatives(criterion.words[found_count - 1])} {next_clause}"
-            if found_count
-            else f"it began with {quote_text(timed_words[0][0])}"
+        next_word = timed_words[end][0] if end < len(timed_words) else ""
+        template = translatable(
+            "%(expectation)s, but it began with %(actual)s instead of %(expected)s (%(found)s of %(count)s in order)."
         )
+        if found_count:
+            template = translatable(
+                "%(expectation)s, but after %(previous)s came %(actual)s instead of %(expected)s (%(found)s of "
+                "%(count)s in order)."
+            )
+        if not next_word:
+            template = translatable(
+                "%(expectation)s, but after %(previous)s came nothing instead of %(expected)s (%(found)s of %(count)s "
+                "in order)."
+            )
         return fail_with(
-            f"Expected the robot to {verb} {expected_text}, but {problem} instead of "
-            f"{_format_alternatives(criterion.words[found_count])} ({found_count} of {count} in order).",
+            Sentence(
+                template,
+                expectation=Sentence(wording.expected, words=expected_text),
+                previous=quote_list(criterion.words[found_count - 1], "or") if found_count else "",
+                actual=quote_text(next_word),
+                expected=quote_list(criterion.words[found_count], "or"),
+                found=found_count,
+                count=count,
+            ),
             reference_line.t,
             get_pose_at(recording, reference_line.t),
             Fraction(found_count, count),
@@ -75,8 +127,7 @@ def _judge_best_run(
     if end < len(timed_words) and not criterion.more:
         word, line = timed_words[end]
         return fail_with(
-            f"Expected the robot to {verb} {expected_text} and nothing after it, but it {past} {quote_text(word)} "
-            "as well.",
+            Sentence(wording.extra, words=expected_text, extra=quote_text(word)),
             line.t,
             get_pose_at(recording, line.t),
             Fraction(count, count + len(timed_words) - end),
@@ -85,17 +136,19 @@ def _judge_best_run(
     hurried_line = _find_hurried_line(lines) if criterion.waits else None
     if hurried_line is not None:
         return fail_with(
-            f"Expected the robot to wait until each word is spoken, but it said {quote_text(hurried_line.text)} while "
-            "it was still speaking.",
+            Sentence(
+                "Expected the robot to wait until each word is spoken, but it said %(text)s while it was still "
+                "speaking.",
+                text=quote_text(hurried_line.text),
+            ),
             hurried_line.t,
             get_pose_at(recording, hurried_line.t),
             Fraction(1, 2),
             findings=(HurriedSpeech(),),
         )
-    measures = (Measure("words", float(count)), Measure("last at", reference_line.t, "s"))
-    return pass_with(
-        f"The robot {past} {expected_text}.", reference_line.t, get_pose_at(recording, reference_line.t), measures
-    )
+    measures = (Measure(Sentence("words"), float(count)), Measure(Sentence("last at"), reference_line.t, "s"))
+    message = Sentence(wording.success, words=expected_text)
+    return pass_with(message, reference_line.t, get_pose_at(recording, reference_line.t), measures)
 
 
 def _build_other_word(
@@ -152,7 +205,3 @@ def _find_hurried_line(lines: Sequence[TimedText]) -> TimedText | None:
 
 def _format_words(criterion: WordSequence) -> str:
     return quote_text(" ".join(texts[0] for texts in criterion.words))
-
-
-def _format_alternatives(texts: tuple[str, ...]) -> str:
-    return quote_list(texts, "or")

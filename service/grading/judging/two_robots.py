@@ -12,8 +12,10 @@ import numpy as np
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.language import translatable
 from sim.recording import Floats, Recording
 from sim.recording_values import count_ticks_until, get_pose_after, tick_to_seconds
+from sim.sentences import Sentence
 from submissions.criteria.two_robots import Apart
 
 
@@ -23,34 +25,53 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
     recording = trial.recording
     distances = _compute_distances(recording)
     if distances is None:
-        return fail_with("Expected two robots, but there was one.")
+        return fail_with(Sentence("Expected two robots, but there was one."))
     last_row = len(distances) - 1
     first_row = last_row if criterion.when == "end" else min(count_ticks_until(recording, criterion.after), last_row)
     counted_distances = distances[first_row:]
     is_right = (counted_distances >= criterion.at_least) & (counted_distances <= (criterion.at_most or np.inf))
     share = Fraction(int(is_right.sum()), len(is_right))
     measures = (
-        Measure("apart at the end", float(distances[last_row]), "mm"),
-        Measure("least apart", float(counted_distances.min()), "mm"),
-        Measure("most apart", float(counted_distances.max()), "mm"),
-        Measure("share of the time", float(share) * 100, "%"),
+        Measure(Sentence("apart at the end"), float(distances[last_row]), "mm"),
+        Measure(Sentence("least apart"), float(counted_distances.min()), "mm"),
+        Measure(Sentence("most apart"), float(counted_distances.max()), "mm"),
+        Measure(Sentence("share of the time"), float(share) * 100, "%"),
     )
-    expected = f"Expected the robots to be {_describe_expected(criterion)}"
+    distance_text = _describe_expected(criterion)
     if criterion.when == "always":
-        required_share = "all" if criterion.share == 1 else f"{criterion.share * 100:g}%"
-        start = tick_to_seconds(recording, first_row)
-        summary = f"this was true for {float(share) * 100:.0f}% of the time after {start:.2f} s"
+        summary = Sentence(
+            "this was true for %(percent).0f%% of the time after %(start).2f s",
+            percent=float(share) * 100,
+            start=tick_to_seconds(recording, first_row),
+        )
         row = first_row + int(np.argmin(is_right))
         if share >= Fraction(str(criterion.share)):
             return pass_with(
-                f"The robots were {_describe_expected(criterion)}: {summary}.",
+                Sentence("The robots were %(expected)s: %(summary)s.", expected=distance_text, summary=summary),
                 tick_to_seconds(recording, last_row),
                 recording.end,
                 measures,
             )
+        template = (
+            translatable(
+                "Expected the robots to be %(expected)s for all of the time, but %(summary)s; at %(seconds).2f s they "
+                "were %(distance).0f mm apart."
+            )
+            if criterion.share == 1
+            else translatable(
+                "Expected the robots to be %(expected)s for %(percent)g%% of the time, but %(summary)s; at "
+                "%(seconds).2f s they were %(distance).0f mm apart."
+            )
+        )
         return fail_with(
-            f"{expected} for {required_share} of the time, but {summary}; at {tick_to_seconds(recording, row):.2f} s "
-            f"they were {distances[row]:.0f} mm apart.",
+            Sentence(
+                template,
+                expected=distance_text,
+                percent=criterion.share * 100,
+                summary=summary,
+                seconds=tick_to_seconds(recording, row),
+                distance=float(distances[row]),
+            ),
             tick_to_seconds(recording, row),
             get_pose_after(recording, row),
             share,
@@ -58,15 +79,29 @@ def judge_apart(criterion: Apart, trial: TrialResult) -> Outcome:
         )
     row = first_row + int(np.argmax(is_right))
     if is_right.any():
-        summary = f"at {tick_to_seconds(recording, row):.2f} s the robots were {distances[row]:.0f} mm apart"
-        return pass_with(
-            f"{summary.capitalize()}.", tick_to_seconds(recording, row), get_pose_after(recording, row), measures
+        message = Sentence(
+            "At %(seconds).2f s the robots were %(distance).0f mm apart.",
+            seconds=tick_to_seconds(recording, row),
+            distance=float(distances[row]),
         )
-    start_time = tick_to_seconds(recording, first_row)
-    time_clause = "at the end" if criterion.when == "end" else f"at some time after {start_time:.2f} s"
-    distance_text = f"{distances[last_row]:.0f} mm" if criterion.when == "end" else _format_span(counted_distances)
+        return pass_with(message, tick_to_seconds(recording, row), get_pose_after(recording, row), measures)
+    template = (
+        translatable("Expected the robots to be %(expected)s at the end, but they were %(distance).0f mm apart.")
+        if criterion.when == "end"
+        else translatable(
+            "Expected the robots to be %(expected)s at some time after %(start).2f s, but they were %(least).0f to "
+            "%(most).0f mm apart."
+        )
+    )
     return fail_with(
-        f"{expected} {time_clause}, but they were {distance_text} apart.",
+        Sentence(
+            template,
+            expected=distance_text,
+            distance=float(distances[last_row]),
+            start=tick_to_seconds(recording, first_row),
+            least=float(counted_distances.min()),
+            most=float(counted_distances.max()),
+        ),
         tick_to_seconds(recording, last_row),
         recording.end,
         measures=measures,
@@ -92,11 +127,7 @@ def _collect_positions(recording: Recording) -> Floats:
 
 def _describe_expected(criterion: Apart) -> str:
     if criterion.at_most is None:
-        return f"at least {criterion.at_least:g} mm apart"
+        return Sentence("at least %(least)g mm apart", least=criterion.at_least)
     if criterion.at_least == 0:
-        return f"within {criterion.at_most:g} mm of each other"
-    return f"{criterion.at_least:g} to {criterion.at_most:g} mm apart"
-
-
-def _format_span(distances: Floats) -> str:
-    return f"{distances.min():.0f} to {distances.max():.0f} mm"
+        return Sentence("within %(most)g mm of each other", most=criterion.at_most)
+    return Sentence("%(least)g to %(most)g mm apart", least=criterion.at_least, most=criterion.at_most)
