@@ -39,7 +39,7 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     """Judge how and when the program ended. Faults of the responder are ignored."""
     recording = trial.recording
     fault = find_ending_fault(recording)
-    measures = (Measure("time", recording.end_t, "s"),)
+    measures = (Measure(Sentence("time"), recording.end_t, "s"),)
     if fault is not None:
         message = Sentence("Expected the program to end by itself, but %(end)s.", end=_describe_end(fault))
         outcome = fail_with(message, fault.t, recording.end, measures=measures, findings=(ReportedFault(fault),))
@@ -71,10 +71,10 @@ def judge_pose(criterion: EndPose, trial: TrialResult) -> Outcome:
     end, t = trial.recording.end, trial.recording.end_t
     pose_text = Sentence("(%(x).1f, %(y).1f) facing %(heading).1f°", x=end.x, y=end.y, heading=end.heading % 360)
     measures = (
-        Measure("end x", end.x, "mm"),
-        Measure("end y", end.y, "mm"),
-        Measure("end heading", end.heading, "°"),
-        Measure("time", t, "s"),
+        Measure(Sentence("end x"), end.x, "mm"),
+        Measure(Sentence("end y"), end.y, "mm"),
+        Measure(Sentence("end heading"), end.heading, "°"),
+        Measure(Sentence("time"), t, "s"),
         *_measure_displacement(trial.recording),
     )
     if criterion.x is not None and criterion.y is not None:
@@ -202,4 +202,4 @@ def _measure_displacement(recording: Recording) -> tuple[Measure, ...]:
     """Return the straight-line distance and direction from start to end."""
     dx, dy = recording.end.x - recording.start.x, recording.end.y - recording.start.y
     bearing = math.degrees(math.atan2(dy, dx))
-    return Measure("displacement", math.hypot(dx, dy), "mm"), Measure("bearing", bearing, "°")
+    return Measure(Sentence("displacement"), math.hypot(dx, dy), "mm"), Measure(Sentence("bearing"), bearing, "°")

@@ -23,11 +23,11 @@ from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
 from service.grading.judging.message_parts import join_clauses
 from service.grading.judging.motion_descriptions import (
+    describe_occurrence,
     describe_proportion,
     describe_reactions,
     describe_reading,
     describe_repetitions,
-    format_ordinal,
     format_times,
 )
 from service.grading.judging.moves import (
@@ -180,10 +180,9 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
         if peak_distance < min_height:
             return fail_with(
                 Sentence(
-                    "Expected the robot to go out at least %(least)g mm the %(ordinal)s time, but it went "
-                    "%(distance).0f mm.",
+                    "Expected the robot to go out at least %(least)g mm %(time)s, but it went %(distance).0f mm.",
                     least=min_height,
-                    ordinal=format_ordinal(number),
+                    time=describe_occurrence(number),
                     distance=peak_distance,
                 ),
                 *find_place(recording, turn.row),
@@ -218,15 +217,15 @@ def judge_excursions(criterion: Excursions, trial: TrialResult) -> Outcome:
                 )
                 if number >= required_count
                 else translatable(
-                    "Expected the robot to come back to within %(limit)g mm of its start each time, but the "
-                    "%(ordinal)s time it came back to %(distance)s mm."
+                    "Expected the robot to come back to within %(limit)g mm of its start each time, but "
+                    "%(time)s it came back to %(distance)s mm."
                 )
             )
             return fail_with(
                 Sentence(
                     template,
                     limit=criterion.returns_within,
-                    ordinal=format_ordinal(number),
+                    time=describe_occurrence(number),
                     distance=format_number(float(start_distances[row])),
                 ),
                 *find_place(recording, row),

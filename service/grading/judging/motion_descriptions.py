@@ -66,13 +66,13 @@ def describe_repetitions(count: int) -> str:
     return Sentence("did so %(times)s", times=format_times(count)) if count else Sentence("never did")
 
 
-def format_ordinal(number: int) -> str:
-    """Return ``first``, ``second``, ``third``, ``4th`` and so on."""
+def describe_occurrence(number: int) -> str:
+    """Return ``the first time``, ``the second time``, ``the third time``, ``the 4th time`` and so on."""
     match number:
         case 1:
-            return Sentence("first")
+            return Sentence("the first time")
         case 2:
-            return Sentence("second")
+            return Sentence("the second time")
         case 3:
-            return Sentence("third")
-    return Sentence("%(number)sth", number=number)
+            return Sentence("the third time")
+    return Sentence("the %(number)sth time", number=number)

@@ -195,10 +195,11 @@ def find_mismatch(required: MotionConditions, move: Move) -> Mismatch | None:
         direction, minimum, maximum = _orient_range(axis, bounds)
         actual_direction = axis.negative if value < 0 else axis.positive
         number = format_number(abs(value))
+        actual_template = actual_direction.actual if number != "0" else _AMOUNT
         description = Sentence(
             "%(expected)s, but it was %(actual)s",
             expected=Sentence(direction.expected, range=_describe_range(minimum, maximum, axis.unit)),
-            actual=Sentence(_AMOUNT if number == "0" else actual_direction.actual, amount=f"{number}{axis.unit}"),
+            actual=Sentence(actual_template, amount=f"{number}{axis.unit}"),
         )
         return Mismatch(description, axis.has_sides and number != "0" and direction is not actual_direction)
     return None
