@@ -5,7 +5,6 @@ The modules of the families write the messages themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from service.grading.grade import TrialResult
@@ -14,8 +13,6 @@ from sim.recording import Fault, Verdict
 from sim.sentences import Sentence, join_sentences
 
 _MAX_QUOTE_LENGTH = 80
-#: By separator. These lists need no translation.
-_LIST_TEMPLATES = {", ": "%(first)s, %(others)s", "; ": "%(first)s; %(others)s"}
 
 
 def quote_text(text: str) -> str:
@@ -33,14 +30,6 @@ def quote_list(texts: tuple[str, ...], conjunction: Literal["and", "or"] = "and"
     if conjunction == "or":
         return Sentence("%(these)s or %(last)s", these=these, last=last_quote)
     return Sentence("%(these)s and %(last)s", these=these, last=last_quote)
-
-
-def join_clauses(clauses: Sequence[str], separator: Literal[", ", "; "] = ", ") -> str:
-    """Join clauses with commas or semicolons; empty without clauses."""
-    first, *others = clauses or ("",)
-    if not others:
-        return first
-    return Sentence(_LIST_TEMPLATES[separator], first=first, others=join_clauses(others, separator))
 
 
 def describe_fault(fault: Fault) -> str:

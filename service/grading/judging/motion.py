@@ -19,9 +19,9 @@ from service.grading.judging.geometry import (
     compute_positions,
     find_place,
 )
+from service.grading.judging.joined_texts import join_with_semicolons
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
-from service.grading.judging.message_parts import join_clauses
 from service.grading.judging.motion_descriptions import (
     describe_occurrence,
     describe_proportion,
@@ -141,7 +141,7 @@ def judge_moves(criterion: Moves, trial: TrialResult) -> Outcome:
             measures=measures,
             findings=(OtherMove(extra_moves[0].seconds),),
         )
-    description = join_clauses([move.describe() for move in matched_moves[:4] if move is not None], "; ")
+    description = join_with_semicolons([move.describe() for move in matched_moves[:4] if move is not None])
     message = Sentence("The robot moved as expected: it %(moves)s.", moves=description)
     return pass_with(message, *find_place(recording, moves[-1].last), measures)
 

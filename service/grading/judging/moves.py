@@ -22,7 +22,7 @@ from service.grading.judging.geometry import (
     find_true_runs,
     to_relative_position,
 )
-from service.grading.judging.message_parts import join_clauses
+from service.grading.judging.joined_texts import join_with_commas
 from service.language import translatable
 from sim.recording import Recording
 from sim.recording_values import get_recorded_robot, tick_to_seconds
@@ -219,7 +219,7 @@ def describe_required_move(required: NamedMotion) -> str:
         if bounds is not None:
             direction, minimum, maximum = _orient_range(_AXES[name], bounds)
             parts.append(Sentence(direction.part, amount=_describe_range(minimum, maximum, _AXES[name].unit)))
-    move = Sentence("a move of %(parts)s", parts=join_clauses(parts))
+    move = Sentence("a move of %(parts)s", parts=join_with_commas(parts))
     return Sentence("%(name)s: %(move)s", name=required.name, move=move) if required.name else move
 
 

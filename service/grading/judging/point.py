@@ -20,6 +20,7 @@ from service.grading.judging.geometry import (
     find_true_runs,
     measure_segment_distance,
 )
+from service.grading.judging.joined_texts import join_with_semicolons
 from service.grading.judging.judge_declaration import (
     Case,
     IndexedTrials,
@@ -28,7 +29,6 @@ from service.grading.judging.judge_declaration import (
     judge_by_trial,
     summarise_trials,
 )
-from service.grading.judging.message_parts import join_clauses
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.language import translatable
 from sim.recording import Floats, Recording
@@ -350,7 +350,7 @@ def _describe_spread(criterion: Spread, trials: Sequence[TrialResult]) -> str:
     return Sentence(
         "The robot ended at these distances from %(point)s: %(distances)s.",
         point=_format_point(criterion),
-        distances=join_clauses(descriptions, "; "),
+        distances=join_with_semicolons(descriptions),
     )
 
 

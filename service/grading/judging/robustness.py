@@ -17,13 +17,34 @@ from service.grading.judging.accuracy_curves import (
     find_levels,
     find_range_above,
 )
+from service.grading.judging.joined_texts import join_with_commas
 from service.grading.judging.judge_declaration import Case, IndexedTrials, declare_case_judge, has_hidden
 from service.grading.judging.outcome import round_to_steps
 from service.grading.judging.recognition import build_recognition_result, classify, judge_pooled
+from service.language import translatable
+from sim.sentences import Sentence, join_sentences
 from submissions.criteria.robustness import Robustness
 from submissions.sweep import CONDITIONS
 
 _MAX_LISTED_LEVELS = 12
+#: The names and units in ``CONDITIONS``, marked for translation.
+CONDITION_WORDS = frozenset(
+    {
+        translatable("start offset in x"),
+        translatable("start offset in y"),
+        translatable("heading offset"),
+        translatable("light noise"),
+        translatable("motor noise"),
+        translatable("message loss"),
+        translatable("message delay"),
+        translatable("mm"),
+        translatable("degrees"),
+        translatable("grey levels"),
+        translatable("degrees per second"),
+        translatable("share of messages"),
+        translatable("s"),
+    }
+)
 
 
 @declare_case_judge(Robustness)
@@ -63,20 +84,29 @@ def _compute_share(criterion: Robustness, curve: AccuracyCurve) -> Fraction:
 
 def _describe_curve(criterion: Robustness, curve: AccuracyCurve) -> str:
     condition = CONDITIONS[criterion.along]
+    name, unit = Sentence(condition.words), Sentence(condition.unit)
     levels = curve.levels
     if not levels:
-        return f"No trial was swept over {condition.words}."
-    values_text = ", ".join(f"{level.value:.2f} at {level.at:g}" for level in levels[:_MAX_LISTED_LEVELS])
-    ellipsis = ", ..." if len(levels) > _MAX_LISTED_LEVELS else ""
-    text = f"By {condition.words} ({condition.unit}): {values_text}{ellipsis}."
+        return Sentence("No trial was swept over %(condition)s.", condition=name)
+    values: list[str] = [
+        Sentence("%(accuracy).2f at %(level)g", accuracy=level.value, level=level.at)
+        for level in levels[:_MAX_LISTED_LEVELS]
+    ]
+    if len(levels) > _MAX_LISTED_LEVELS:
+        values.append("...")
+    summary = Sentence(
+        "By %(condition)s (%(unit)s): %(values)s.", condition=name, unit=unit, values=join_with_commas(values)
+    )
     if criterion.level is None:
-        return f"{text} Mean over the sweep: {float(compute_area(levels)):.2f}."
+        return join_sentences(summary, Sentence("Mean over the sweep: %(mean).2f.", mean=float(compute_area(levels))))
     level_range = find_range_above(levels, criterion.level)
     if level_range is None:
-        return f"{text} It is below {criterion.level:g} even at the easiest level."
-    range_text = (
-        f"only at {level_range[0].at:g}"
-        if level_range[0].at == level_range[1].at
-        else f"from {level_range[0].at:g} to {level_range[1].at:g}"
+        below = Sentence("It is below %(level)g even at the easiest level.", level=criterion.level)
+        return join_sentences(summary, below)
+    first, last = (level.at for level in level_range)
+    template = (
+        translatable("It is at least %(level)g only at %(first)g %(unit)s.")
+        if first == last
+        else translatable("It is at least %(level)g from %(first)g to %(last)g %(unit)s.")
     )
-    return f"{text} It is at least {criterion.level:g} {range_text} {condition.unit}."
+    return join_sentences(summary, Sentence(template, level=criterion.level, first=first, last=last, unit=unit))
