@@ -217,7 +217,7 @@ def _combine_call_scores(
 ) -> Outcome:
     """Return the outcome of the calls. ``problem`` describes the first problem, if any."""
     share = sum(scores, Fraction(0)) / len(scores)
-    measures = (Measure("right", float(share)),)
+    measures = (Measure(Sentence("right"), float(share)),)
     if not problem or (criterion.table and share >= Fraction(str(criterion.at_least))):
         return pass_with(_describe_right_calls(criterion, scores, share), measures=measures, for_staff=for_staff)
     right_count = sum(score == 1 for score in scores)

@@ -55,10 +55,10 @@ def judge_collects(criterion: Collects, trial: TrialResult) -> Outcome:
     counts = Counter(pair.label for pair in _drop_repeated_pairs(usable, recording))
     repeated_count = len(pairs) - len(_drop_repeated_pairs(pairs, recording))
     measures = (
-        Measure("pairs", float(len(pairs))),
-        Measure("usable", float(len(usable))),
-        Measure("duplicates", float(repeated_count)),
-        *(Measure(f"different: {label}", float(counts[label])) for label in classes),
+        Measure(Sentence("pairs"), float(len(pairs))),
+        Measure(Sentence("usable"), float(len(usable))),
+        Measure(Sentence("duplicates"), float(repeated_count)),
+        *(Measure(Sentence("different: %(label)s", label=label), float(counts[label])) for label in classes),
     )
     last_image = pairs[-1].image if pairs else None
     required_count = criterion.each * len(classes)

@@ -52,9 +52,9 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     samples = measured_samples if criterion.measured is None else _drop_repeats(measured_samples)
     invented_count = len(logged_samples) - len(measured_samples)
     values = [datum.value for datum in samples]
-    measures = (Measure("samples", float(len(values))), *_measure_extremes(values))
+    measures = (Measure(Sentence("samples"), float(len(values))), *_measure_extremes(values))
     if criterion.measured is not None:
-        measures += (Measure("made up", float(invented_count)),)
+        measures += (Measure(Sentence("made up"), float(invented_count)),)
     readings = _READINGS[criterion.measured] if criterion.measured is not None else ""
     if logged_samples and not values:
         message = Sentence(
@@ -188,7 +188,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
                 ),
             )
         )
-    measures = (Measure("images", float(len(log))),)
+    measures = (Measure(Sentence("images"), float(len(log))),)
     problem = next((words for reached, words in checks if reached < 1), None)
     if problem is None:
         message = (
@@ -205,7 +205,7 @@ def judge_image_log(criterion: ImageLog, trial: TrialResult) -> Outcome:
 
 def _measure_extremes(values: Sequence[float]) -> tuple[Measure, ...]:
     finite = [value for value in values if math.isfinite(value)]
-    return (Measure("least", min(finite)), Measure("most", max(finite))) if finite else ()
+    return (Measure(Sentence("least"), min(finite)), Measure(Sentence("most"), max(finite))) if finite else ()
 
 
 def _check_datalog(criterion: Datalog, samples: Sequence[DatalogEntry], recording: Recording) -> list[Check]:

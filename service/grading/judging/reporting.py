@@ -80,7 +80,9 @@ def _judge_report(
         return fail_with(describe_missing_report(criterion, expectation))
     report = ReportTokens(tokens, rows, criterion.leeway)
     match = report.find(answer_row)
-    measures = tuple(Measure(f"reported {place}", value) for place, value in enumerate(match.values, 1))
+    measures = tuple(
+        Measure(Sentence("reported %(number)s", number=place), value) for place, value in enumerate(match.values, 1)
+    )
     report_text = quote_text(" | ".join(texts))
     problem = _describe_forbidden_text(criterion, answer_row, tokens) or _describe_other_label(
         criterion, answer_row, rows, report
@@ -275,7 +277,8 @@ def _judge_mentions(criterion: Events, mentions: Sequence[_Mention], recording: 
         start = index + 1
     names = tuple(event.text[0] for event in criterion.events)
     measures = tuple(
-        Measure(f"x at {name}", each.place[0], "mm") for name, each in zip(names, matched_mentions, strict=True)
+        Measure(Sentence("x at %(name)s", name=name), each.place[0], "mm")
+        for name, each in zip(names, matched_mentions, strict=True)
     )
     end = matched_mentions[-1].line.t
     return pass_with(

@@ -68,7 +68,7 @@ def judge_resends(criterion: Resends, trial: TrialResult) -> Outcome:
         return fail_with(_describe_few_questions(expected, questions))
     mistakes = [(each, found) for each in questions if (found := _find_mistake(criterion, each, recording))]
     tries = sum(len(each.tries) for each in questions)
-    measures = (Measure("different messages", len(questions)), Measure("tries", tries))
+    measures = (Measure(Sentence("different messages"), len(questions)), Measure(Sentence("tries"), tries))
     count = len(questions)
     if not mistakes:
         template = (
@@ -111,7 +111,10 @@ def judge_in_reach(criterion: InReach, trial: TrialResult) -> Outcome:
     ]
     unreachable_messages = [message for message in sent_messages if is_out_of_reach(message)]
     reach_count = len(sent_messages) - len(unreachable_messages)
-    measures = (Measure("sent in reach", reach_count), Measure("sent out of reach", len(unreachable_messages)))
+    measures = (
+        Measure(Sentence("sent in reach"), reach_count),
+        Measure(Sentence("sent out of reach"), len(unreachable_messages)),
+    )
     summary = Sentence("%(reach)s of %(count)s sent in reach", reach=reach_count, count=len(sent_messages))
     if len(unreachable_messages) > criterion.misses:
         first_message = unreachable_messages[0]
