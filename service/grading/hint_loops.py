@@ -5,15 +5,19 @@ The loop's condition and body are searched for the reason. If there is no clear 
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Iterator, Sequence
 
 from service.grading.findings import ReportedFault
+from service.grading.hint_amounts import describe_large_amount, describe_passed_amount
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
-from service.grading.hint_tables import AMOUNTS, CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
+from service.grading.hint_discarded_values import describe_discarded_value, suggest_correct_statement
+from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
+from service.grading.judging.message_parts import add_place
+from service.language import translatable
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
+from sim.sentences import Sentence
 
 _LIMITS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT)
 _FREE_PROPERTIES = frozenset({"position", "speed", "state", "is_running"})
@@ -53,8 +57,8 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
     code = listing.code
     amount = describe_large_amount(code, statement, clues.limit)
     if amount:
-        return f"{listing.locate(statement.line)}: {amount}"
-    passed_amount = _describe_passed_amount(code, listing, statement)
+        return add_place(listing.locate(statement.line), amount)
+    passed_amount = describe_passed_amount(code, listing, statement)
     if passed_amount:
         return passed_amount
     loops = code.list_enclosing_loops(statement)
@@ -62,26 +66,43 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
         explanation = _explain_endless_loop(loop, code, listing, fault)
         if explanation:
             return explanation
-    stop_event = "the simulated time was up" if fault.verdict is Verdict.TIME_LIMIT else "it was stopped"
-    part_name = "responder" if fault.who == "responder" else "program"
     if loops and clues.is_stationary and _waits_for_motion(loops[0], code):
-        return (
-            f"{listing.locate(loops[0].line)}: the loop waits until the robot has moved, but no line switches the "
-            f"motors on, so {join_tokens(loops[0].condition)} stays true. Write tank_drive.on(20, 20) above line "
-            f"{loops[0].line}"
+        return Sentence(
+            "%(place)s: the loop waits until the robot has moved, but no line switches the motors on, so "
+            "%(condition)s stays true. Write tank_drive.on(20, 20) above line %(line)s",
+            place=listing.locate(loops[0].line),
+            condition=join_tokens(loops[0].condition),
+            line=loops[0].line,
         )
     if loops and loops[0].has_token("pyState") and not clues.answers:
-        reason = "no answer came" if clues.sent else "no message was sent: print one that begins with PY:: or IMG_DATA"
-        return f"{listing.locate(loops[0].line)}: the loop waits for a message in the queue, but {reason}"
-    if loops:
-        head = join_tokens(loops[0].tokens)
-        return (
-            f'{listing.locate(loops[0].line)}: the {part_name} was still in the loop "{head}" when {stop_event}. '
-            f"{_suggest_loop_fix(loops[0], code, fault)}"
+        template = (
+            translatable("%(place)s: the loop waits for a message in the queue, but no answer came")
+            if clues.sent
+            else translatable(
+                "%(place)s: the loop waits for a message in the queue, but no message was sent: print one that begins "
+                "with PY:: or IMG_DATA"
+            )
         )
-    return (
-        f'{listing.locate(statement.line)}: the {part_name} was still in the line "{join_tokens(statement.tokens)}" '
-        f"when {stop_event}. Check what it waits for, and whether that ever happens"
+        return Sentence(template, place=listing.locate(loops[0].line))
+    part = Sentence("the responder") if fault.who == "responder" else Sentence("the program")
+    is_time_up = fault.verdict is Verdict.TIME_LIMIT
+    stop_event = Sentence("the simulated time was up") if is_time_up else Sentence("it was stopped")
+    if loops:
+        return Sentence(
+            '%(place)s: %(part)s was still in the loop "%(code)s" when %(event)s. %(advice)s',
+            place=listing.locate(loops[0].line),
+            part=part,
+            code=join_tokens(loops[0].tokens),
+            event=stop_event,
+            advice=_suggest_loop_fix(loops[0], code, fault),
+        )
+    return Sentence(
+        '%(place)s: %(part)s was still in the line "%(code)s" when %(event)s. Check what it waits for, and whether '
+        "that ever happens",
+        place=listing.locate(statement.line),
+        part=part,
+        code=join_tokens(statement.tokens),
+        event=stop_event,
     )
 
 
@@ -94,54 +115,12 @@ def _waits_for_motion(loop: Statement, code: CodeStatements) -> bool:
 
 def _suggest_loop_fix(loop: Statement, code: CodeStatements, fault: Fault) -> str:
     if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder" and not _is_waiting(loop, code):
-        return "Nothing in it waits, so the robot cannot move. Add time.sleep(0.1), or read a sensor, in the loop"
+        return Sentence(
+            "Nothing in it waits, so the robot cannot move. Add time.sleep(0.1), or read a sensor, in the loop"
+        )
     if fault.who == "responder":
-        return "Check when it ends, or make the calculation smaller"
-    return "Check when its condition becomes false, or end it with break"
-
-
-def describe_large_amount(code: CodeStatements, statement: Statement, time_limit: float) -> str:
-    """Return a hint that a call has a time or an amount in the wrong unit; otherwise empty."""
-    for call in statement.calls:
-        usual_amount = AMOUNTS.get(call.name.rpartition(".")[2])
-        arguments = [each for each in call.arguments if "=" not in each]
-        number = code.number(arguments[-1]) if arguments else None
-        if usual_amount is None or number is None or abs(number) < min(usual_amount[0], time_limit or usual_amount[0]):
-            continue
-        maximum, unit, other_unit = usual_amount
-        if abs(number) < maximum / 2:
-            continue
-        if other_unit == "milliseconds":
-            fix = f"{number:g} milliseconds are {number / 1000:g} seconds: write {number / 1000:g}"
-        else:
-            fix = f"For {number:g} degrees of the wheels write on_for_degrees, or {number / 360:g} rotations"
-        return f"{call.name} takes {unit}, and {number:g} {unit} are too many. {fix}"
-    return ""
-
-
-def _describe_passed_amount(code: CodeStatements, listing: Listing, statement: Statement) -> str:
-    """Return a hint on a call that gives a function a much too large number for an amount; otherwise empty."""
-    head = next((each for each in code.list_enclosing(statement) if each.keyword == "def"), None)
-    parameters = (
-        [token for at, token in enumerate(head.tokens) if at > 2 and head.tokens[at - 1] in "(,"] if head else []
-    )
-    for call in statement.calls if head is not None else ():
-        usual_amount = AMOUNTS.get(call.name.rpartition(".")[2])
-        name = call.arguments[-1][0] if call.arguments and len(call.arguments[-1]) == 1 else ""
-        if usual_amount is None or head is None or name not in parameters:
-            continue
-        for caller in code.statements:
-            for outer in caller.calls if caller is not head else ():
-                place = parameters.index(name)
-                argument = outer.arguments[place] if len(outer.arguments) > place else ()
-                number = code.number(argument[2:] if argument[1:2] == ("=",) else argument) if argument else None
-                if outer.name == head.tokens[1] and number is not None and abs(number) >= usual_amount[0]:
-                    return (
-                        f"{listing.locate(caller.line)} gives {outer.name} {number:g} for {name}, and {number:g} "
-                        f"{usual_amount[1]} are too many. Check the order of the values: "
-                        f"{join_tokens(head.tokens)[4:-1]}"
-                    )
-    return ""
+        return Sentence("Check when it ends, or make the calculation smaller")
+    return Sentence("Check when its condition becomes false, or end it with break")
 
 
 def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listing, fault: Fault) -> str:
@@ -154,32 +133,32 @@ def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listin
             number for each in (range_call.arguments if range_call else ()) if (number := code.number(each)) is not None
         ]
         if numbers and max(map(abs, numbers)) >= _MAX_ITERATIONS:
-            return f"{location}: this loop has {max(numbers):,.0f} passes, which is too many. Use a smaller number"
+            return Sentence(
+                "%(place)s: this loop has %(count)s passes, which is too many. Use a smaller number",
+                place=location,
+                count=f"{max(numbers):,.0f}",
+            )
         return ""
-    head, condition = join_tokens(loop.tokens), loop.condition
+    head, condition = join_tokens(loop.tokens)[:-1], loop.condition
     for statement in body:
         effect = describe_discarded_value(statement, code)
         if effect and any(token in condition for token in statement.tokens if is_name(token)):
-            consequence = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-            return f"{listing.locate(statement.line)}: {effect}, {consequence}. {suggest_correct_statement(statement)}"
+            return _describe_effect(effect, statement, loop, listing, suggest_correct_statement(statement))
     if condition in (("True",), ("1",), ("not", "False")):
         stale_reading = _describe_stale_reading(loop, body, code)
         if stale_reading:
-            return f"{location}: {stale_reading}"
+            return add_place(location, stale_reading)
         if any(each.keyword in ("break", "return") for each in body):
             return ""
-        return (
-            f"{location}: {head[:-1]} repeats for ever{_describe_missing_actions(body, fault)}. "
-            f"{_suggest_loop_end(body, fault)}"
-        )
+        problem, advice = _describe_repetition(head, body, fault), _suggest_loop_end(body, fault)
+        return Sentence("%(place)s: %(problem)s. %(advice)s", place=location, problem=problem, advice=advice)
     explanation = explain_always_true(condition, code)
     if explanation:
-        return f"{location}: {head[:-1]} never ends: {explanation}"
+        return Sentence("%(place)s: %(code)s never ends: %(reason)s", place=location, code=head, reason=explanation)
     step = _find_wrong_step(loop, body)
     if step:
         statement, effect, fix = step
-        consequence = f"so the loop in line {loop.line}, {head[:-1]}, never ends"
-        return f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)} {effect}, {consequence}. {fix}"
+        return _describe_effect(effect, statement, loop, listing, fix)
     names = {token for place, token in enumerate(condition) if is_name(token) and token not in _KEYWORDS}
     has_reading = any(token in (".", "(") for token in condition)
     assigned_names = {name for each in body for name in each.bound_names}
@@ -190,16 +169,35 @@ def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listin
         and not names & assigned_names
         and not any(each.keyword == "global" for each in code.statements)
     ):
-        return f"{location}: {head[:-1]} never ends: {_describe_unchanged_names(sorted(names), loop, code, calls)}"
+        explanation = _describe_unchanged_names(sorted(names), loop, code, calls)
+        return Sentence("%(place)s: %(code)s never ends: %(reason)s", place=location, code=head, reason=explanation)
     equality_indices = [place for place, token in enumerate(condition) if token in ("!=", "==")]
     if (
         equality_indices
         and any(token in PROPERTIES for token in condition)
         and any(each[:1].isdigit() for each in condition)
     ):
-        reason = "the value can jump past the number between two readings"
-        return f"{location}: {head[:-1]} does not end: {reason}. Compare with < or >"
+        return Sentence(
+            "%(place)s: %(code)s does not end: the value can jump past the number between two readings. Compare with "
+            "%(less)s or %(greater)s",
+            place=location,
+            code=head,
+            less="<",
+            greater=">",
+        )
     return ""
+
+
+def _describe_effect(effect: str, statement: Statement, loop: Statement, listing: Listing, advice: str) -> str:
+    """Return a hint on a statement whose effect is that a loop never ends."""
+    return Sentence(
+        "%(place)s: %(effect)s, so the loop in line %(line)s, %(code)s, never ends. %(advice)s",
+        place=listing.locate(statement.line),
+        effect=effect,
+        line=loop.line,
+        code=join_tokens(loop.tokens)[:-1],
+        advice=advice,
+    )
 
 
 def _find_wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statement, str, str] | None:
@@ -211,13 +209,17 @@ def _find_wrong_step(loop: Statement, body: Sequence[Statement]) -> tuple[Statem
     for statement in body:
         if statement.parent != loop.number:
             continue
+        step_code = join_tokens(statement.tokens)
         if statement.target == name and len(statement.tokens) == 3 and not is_name(statement.tokens[2]):
-            effect = f"gives {name} the same value in each pass"
-            return statement, effect, "Move it to the line before the loop, without indentation"
+            effect = Sentence("%(code)s gives %(name)s the same value in each pass", code=step_code, name=name)
+            return statement, effect, Sentence("Move it to the line before the loop, without indentation")
         direction = _find_step_sign(statement, name)
         if direction == _DIVERGING_SIGNS[sign]:
-            verb, correct_sign = ("grow", "-") if direction == "+" else ("shrink", "+")
-            return statement, f"makes {name} {verb}", f"Write {correct_sign} instead of {direction}"
+            is_growing = direction == "+"
+            template = translatable("%(code)s makes %(name)s grow")
+            template = template if is_growing else translatable("%(code)s makes %(name)s shrink")
+            fix = Sentence("Write %(right)s instead of %(wrong)s", right="-" if is_growing else "+", wrong=direction)
+            return statement, Sentence(template, code=step_code, name=name), fix
     return None
 
 
@@ -247,64 +249,41 @@ def _describe_stale_reading(loop: Statement, body: Sequence[Statement], code: Co
             and statement.target not in assigned_names
             and any(one.has_token(statement.target) for one in body)
         ):
-            reading_code = join_tokens(statement.tokens)
-            return (
-                f"{statement.target} is read once, in line {statement.line}, and not again. Repeat {reading_code} in "
-                "the loop"
-            )
+            return _describe_single_reading(statement)
     return ""
 
 
-def _describe_missing_actions(body: Sequence[Statement], fault: Fault) -> str:
-    missing_actions = []
-    if fault.verdict is Verdict.CPU_LIMIT and fault.who != "responder":
-        missing_actions.append("nothing in it waits")
-    if not any(_is_reading(each) for each in body) and fault.who != "responder":
-        missing_actions.append("it reads no sensor")
-    return f", and {' and '.join(missing_actions)}" if missing_actions else ""
+def _describe_single_reading(assignment: Statement) -> str:
+    return Sentence(
+        "%(name)s is read once, in line %(line)s, and not again. Repeat %(code)s in the loop",
+        name=assignment.target,
+        line=assignment.line,
+        code=join_tokens(assignment.tokens),
+    )
+
+
+def _describe_repetition(head: str, body: Sequence[Statement], fault: Fault) -> str:
+    """Return that a loop has no end, and what it lacks."""
+    is_robot = fault.who != "responder"
+    lacks_wait = is_robot and fault.verdict is Verdict.CPU_LIMIT
+    lacks_reading = is_robot and not any(_is_reading(each) for each in body)
+    if lacks_wait and lacks_reading:
+        template = translatable("%(code)s repeats for ever, and nothing in it waits and it reads no sensor")
+    elif lacks_wait:
+        template = translatable("%(code)s repeats for ever, and nothing in it waits")
+    elif lacks_reading:
+        template = translatable("%(code)s repeats for ever, and it reads no sensor")
+    else:
+        template = translatable("%(code)s repeats for ever")
+    return Sentence(template, code=head)
 
 
 def _suggest_loop_end(body: Sequence[Statement], fault: Fault) -> str:
     if fault.who == "responder":
-        return "End it with break, or write a condition instead of True"
+        return Sentence("End it with break, or write a condition instead of True")
     if fault.verdict is Verdict.CPU_LIMIT:
-        return "Read a sensor in its condition, or add time.sleep(0.1) and end it with break"
-    return "End it with break, write a condition that reads a sensor, or remove the loop"
-
-
-def describe_discarded_value(statement: Statement, code: CodeStatements) -> str:
-    """Return a hint that a statement computes a value and discards it; empty if it has an effect."""
-    tokens = statement.tokens
-    if _has_reversed_operator(statement, code):
-        return f"{tokens[0]} ={tokens[2]} {tokens[3]} sets {tokens[0]} to {tokens[2]}{tokens[3]}"
-    operators = [token for token in tokens if token in ("+", "-", "*", "/", "==", "<", ">")]
-    if not is_name(tokens[0]) or not operators or any(each.endswith("=") and each != "==" for each in tokens):
-        return ""
-    is_plain = all(is_name(each) or each in "+-*/.==<>" or each[0].isdigit() for each in tokens)
-    return f"{join_tokens(tokens)} has no effect" if is_plain and tokens[0] not in _STATEMENTS else ""
-
-
-def _has_reversed_operator(statement: Statement, code: CodeStatements) -> bool:
-    """Return whether this is ``count =- 1``, spaced so, in a loop, for a variable assigned earlier."""
-    tokens, columns, name = statement.tokens, statement.columns, statement.target
-    if len(tokens) != 4 or not name or name.isupper() or tokens[2] not in ("+", "-"):
-        return False
-    is_written_so = columns[2] == columns[1] + 1 and columns[3] > columns[2] + 1
-    has_value = any(each.target == name for each in code.statements[: statement.number])
-    return is_written_so and has_value and bool(code.list_enclosing_loops(statement))
-
-
-_STATEMENTS = frozenset(keyword.kwlist)
-
-
-def suggest_correct_statement(statement: Statement) -> str:
-    """Return the correct form of a statement without effect."""
-    tokens = statement.tokens
-    if tokens[1] == "=":
-        return f"Write {tokens[0]} {tokens[2]}= {tokens[3]}"
-    if tokens[1] == "==":
-        return f"Write one = for an assignment: {tokens[0]} = {join_tokens(tokens[2:])}"
-    return f"Write {tokens[0]} = {join_tokens(tokens)}"
+        return Sentence("Read a sensor in its condition, or add time.sleep(0.1) and end it with break")
+    return Sentence("End it with break, write a condition that reads a sensor, or remove the loop")
 
 
 def explain_always_true(condition: Sequence[str], code: CodeStatements) -> str:
@@ -316,19 +295,28 @@ def explain_always_true(condition: Sequence[str], code: CodeStatements) -> str:
     number = code.number(condition[sign_index + 1 :])
     if not name or number is None:
         return ""
-    minimum, maximum, unit = READINGS[name]
+    minimum, maximum, _ = READINGS[name]
     is_always_true = {">=": number <= minimum, ">": number < minimum, "<=": number >= maximum, "<": number > maximum}[
         sign
     ]
     if not is_always_true:
         return ""
-    condition_text = join_tokens(condition)
     advice = (
-        f"Write {sign[0]} {number:g}"
+        Sentence("Write %(sign)s %(number)g", sign=sign[0], number=number)
         if sign in (">=", "<=") and number in (minimum, maximum)
-        else "Choose a number within"
+        else Sentence("Choose a number within")
     )
-    return f"{condition_text} is always true, because {name} {unit}. {advice}"
+    return Sentence(
+        "%(code)s is always true, because %(range)s. %(advice)s",
+        code=join_tokens(condition),
+        range=describe_reading(name),
+        advice=advice,
+    )
+
+
+def describe_reading(name: str) -> str:
+    """Return the range and unit of a reading, as a clause."""
+    return Sentence(READINGS[name][2], reading=name)
 
 
 def find_reading(tokens: Sequence[str], code: CodeStatements) -> str:
@@ -346,18 +334,19 @@ def _find_source_token(tokens: Sequence[str], code: CodeStatements) -> str:
 
 
 def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
-    name_list = " and ".join(names[:2])
-    verb = "does not change" if len(names) == 1 else "do not change"
     for name in names:
         assignment = next(
             (each for each in code.statements[: loop.number] if each.target == name and _is_reading(each)), None
         )
         if assignment is not None:
-            return (
-                f"{name} is read once, in line {assignment.line}, and not again. Repeat "
-                f"{join_tokens(assignment.tokens)} in the loop"
-            )
-    return f"{name_list} {verb} in the loop. Assign {names[0]} in the loop"
+            return _describe_single_reading(assignment)
+    if len(names) == 1:
+        return Sentence("%(name)s does not change in the loop. Assign %(name)s in the loop", name=names[0])
+    return Sentence(
+        "%(first)s and %(second)s do not change in the loop. Assign %(first)s in the loop",
+        first=names[0],
+        second=names[1],
+    )
 
 
 def _is_reading(statement: Statement) -> bool:

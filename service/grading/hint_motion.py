@@ -8,12 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from service.grading.findings import OtherTurn
+from service.grading.hint_amounts import describe_large_amount
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CallInCode, Statement, join_tokens
-from service.grading.hint_loops import describe_large_amount, find_reading
+from service.grading.hint_loops import describe_reading, find_reading
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, READINGS
 from service.grading.judging.geometry import to_relative_position
+from service.grading.judging.message_parts import add_place
+from service.language import translatable
+from sim.sentences import Sentence
 from submissions.criteria import Criterion
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose
@@ -43,22 +47,26 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
     started_moves = [pair for pair in moves if has_motor_call(pair[1], CONTINUOUS_MOVES)]
     if zero_moves and len(zero_moves) == len(moves):
         listing, statement = zero_moves[0]
-        yield (
-            f"{listing.locate(statement.line)} drives with speed or length 0, so the robot never moved. Write a larger "
-            "number"
+        yield Sentence(
+            "%(place)s drives with speed or length 0, so the robot never moved. Write a larger number",
+            place=listing.locate(statement.line),
         )
     elif unwaited_moves:
         listing, statement = unwaited_moves[0]
-        yield (
-            f"{listing.locate(statement.line)}: with block=False the program does not wait, and it ends before the "
-            "robot moves. Remove block=False"
+        yield Sentence(
+            "%(place)s: with block=False the program does not wait, and it ends before the robot moves. Remove "
+            "block=False",
+            place=listing.locate(statement.line),
         )
     elif started_moves and _list_enclosing_conditions(*started_moves[0]):
         listing, statement = started_moves[0]
         head = _list_enclosing_conditions(listing, statement)[0]
-        yield (
-            f"{listing.locate(head.line)}: the robot never moved. Line {statement.line} runs only if "
-            f"{join_tokens(head.condition)} is true. Print the values in it, and check the condition"
+        yield Sentence(
+            "%(place)s: the robot never moved. Line %(line)s runs only if %(condition)s is true. Print the values "
+            "in it, and check the condition",
+            place=listing.locate(head.line),
+            line=statement.line,
+            condition=join_tokens(head.condition),
         )
     elif started_moves:
         listing, statement = started_moves[0]
@@ -70,25 +78,36 @@ def hint_about_stillness(clues: Clues) -> Iterator[str]:
             ),
             None,
         )
-        consequence = (
-            f"line {stop_statement.line} switches them off at once" if stop_statement else "the program ends at once"
+        template = (
+            translatable(
+                "%(place)s switches the motors on, but nothing waits after it: line %(line)s switches them off at "
+                "once, and the robot never moved. Add time.sleep(2), with import time above, or use on_for_seconds"
+            )
+            if stop_statement
+            else translatable(
+                "%(place)s switches the motors on, but nothing waits after it: the program ends at once, and the robot "
+                "never moved. Add time.sleep(2), with import time above, or use on_for_seconds"
+            )
         )
-        yield (
-            f"{listing.locate(statement.line)} switches the motors on, but nothing waits after it: {consequence}, and "
-            "the robot never moved. Add time.sleep(2), with import time above, or use on_for_seconds"
-        )
+        stop_line = stop_statement.line if stop_statement else 0
+        yield Sentence(template, place=listing.locate(statement.line), line=stop_line)
     elif moves and all(_list_enclosing_conditions(*pair) for pair in moves):
         listing, statement = moves[0]
         head = _list_enclosing_conditions(listing, statement)[0]
-        yield (
-            f"{listing.locate(statement.line)} moves the robot, but the program never reached it: the robot never "
-            f"moved. Check the condition in line {head.line}: {join_tokens(head.condition)}"
+        yield Sentence(
+            "%(place)s moves the robot, but the program never reached it: the robot never moved. Check the "
+            "condition in line %(line)s: %(condition)s",
+            place=listing.locate(statement.line),
+            line=head.line,
+            condition=join_tokens(head.condition),
         )
     elif moves or not any(listing.code.statements for listing in clues.programs):
         return
     elif any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost):
-        example = "for example with tank_drive.on_for_seconds(20, 20, 1)"
-        yield f"the robot never moved; expected the program to switch its motors on, {example}"
+        yield Sentence(
+            "the robot never moved; expected the program to switch its motors on, for example with "
+            "tank_drive.on_for_seconds(20, 20, 1)"
+        )
 
 
 def _has_no_block(statement: Statement) -> bool:
@@ -108,15 +127,15 @@ def hint_about_units(clues: Clues) -> Iterator[str]:
     for listing, statement in collect_statements(clues):
         amount_hint = describe_large_amount(listing.code, statement, 0)
         if amount_hint and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
-            yield f"{listing.locate(statement.line)}: {amount_hint}"
+            yield add_place(listing.locate(statement.line), amount_hint)
             return
         degrees_hint = _describe_small_degrees(listing, statement)
         if degrees_hint and any(isinstance(lost, DRIVING_CRITERIA + STOPPING_CRITERIA) for lost in clues.lost):
-            yield f"{listing.locate(statement.line)}: {degrees_hint}"
+            yield add_place(listing.locate(statement.line), degrees_hint)
             return
         range_hint = _describe_impossible_threshold(listing, statement)
         if range_hint:
-            yield f"{listing.locate(statement.line)}: {range_hint}"
+            yield add_place(listing.locate(statement.line), range_hint)
             return
 
 
@@ -133,9 +152,11 @@ def hint_about_raw_light(clues: Clues) -> Iterator[str]:
         is_percent_used = any(each.has_token("reflected_light_intensity_pc") for each in listing.code.statements)
         if reading != "reflected_light_intensity" or number is None or not 0 < number <= 100 or is_percent_used:
             continue
-        yield (
-            f"{listing.locate(statement.line)} compares reflected_light_intensity with {number:g}: it goes from 0 to "
-            f"255. If {number:g} is in percent, write reflected_light_intensity_pc"
+        yield Sentence(
+            "%(place)s compares reflected_light_intensity with %(number)g: it goes from 0 to 255. If %(number)g "
+            "is in percent, write reflected_light_intensity_pc",
+            place=listing.locate(statement.line),
+            number=number,
         )
         return
 
@@ -146,9 +167,12 @@ def _describe_small_degrees(listing: Listing, statement: Statement) -> str:
         amount = listing.code.number(call.arguments[-1]) if call.arguments else None
         if call.name.rpartition(".")[2] != "on_for_degrees" or not amount or abs(amount) >= _MIN_DEGREES:
             continue
-        return (
-            f"{call.name} takes degrees, and {amount:g}° of the wheels hardly move the robot. If you mean rotations, "
-            f"write on_for_rotations, or {360 * amount:g} degrees"
+        return Sentence(
+            "%(name)s takes degrees, and %(amount)g° of the wheels hardly move the robot. If you mean "
+            "rotations, write on_for_rotations, or %(degrees)g degrees",
+            name=call.name,
+            amount=amount,
+            degrees=360 * amount,
         )
     return ""
 
@@ -175,15 +199,27 @@ def hint_about_distances(clues: Clues) -> Iterator[str]:
         )
         missing_way = measure_missing_way(clues)
         if missing_way is not None and 0 < missing_way < 10 * number:
-            yield (
-                f"{listing.locate(statement.line)} compares distance_centimeters with {number:g} centimetres, and the "
-                f"robot stopped {missing_way:.0f} mm too early. Go on until about {number - missing_way / 10:.2g}"
+            yield Sentence(
+                "%(place)s compares distance_centimeters with %(number)g centimetres, and the robot stopped "
+                "%(distance).0f mm too early. Go on until about %(right).2g",
+                place=listing.locate(statement.line),
+                number=number,
+                distance=missing_way,
+                right=number - missing_way / 10,
             )
             return
+        explanation = Sentence(
+            "%(place)s compares distance_centimeters with %(number)g: that is in centimetres, so %(millimetres)g mm. "
+            "For %(number)g mm write %(right)g",
+            place=listing.locate(statement.line),
+            number=number,
+            millimetres=10 * number,
+            right=number / 10,
+        )
         yield (
-            f"{listing.locate(statement.line)} compares distance_centimeters with {number:g}: that is in centimetres, "
-            f"so {10 * number:g} mm. For {number:g} mm write "
-            f"{number / 10:g}{'. ' if failure_message else ''}{failure_message.rstrip('.')}"
+            Sentence("%(hint)s. %(failure)s", hint=explanation, failure=failure_message)
+            if failure_message
+            else explanation
         )
 
 
@@ -216,10 +252,15 @@ def hint_about_turns(clues: Clues) -> Iterator[str]:
         if listing.code.list_enclosing_loops(statement) and not isinstance(criterion, Drawing):
             continue
         middle = abs(sum(required_turn) / 2)
-        yield (
-            f"{listing.locate(statement.line)}: the robot turned {degrees:.1f}°; expected {required_turn[0]:g} "
-            f"to {required_turn[1]:g}°. "
-            f"Change {amount:g} to about {_format_number(amount * middle / degrees)}"
+        yield Sentence(
+            "%(place)s: the robot turned %(degrees).1f°; expected %(least)g to %(most)g°. Change %(amount)g to "
+            "about %(right)s",
+            place=listing.locate(statement.line),
+            degrees=degrees,
+            least=required_turn[0],
+            most=required_turn[1],
+            amount=amount,
+            right=_format_number(amount * middle / degrees),
         )
         return
 
@@ -243,10 +284,11 @@ def hint_about_missing_turn(clues: Clues) -> Iterator[str]:
             straight_moves.append((listing, statement, call))
     if len(straight_moves) > 1:
         listing, statement, call = straight_moves[-1]
-        amount = join_tokens(call.arguments[-1])
-        yield (
-            f"{listing.locate(statement.line)} drives straight on: both wheels have the same speed, and no line turns "
-            f"the robot. To turn on the spot, write tank_turn.on_for_rotations(-100, 20, {amount})"
+        yield Sentence(
+            "%(place)s drives straight on: both wheels have the same speed, and no line turns the robot. To "
+            "turn on the spot, write tank_turn.on_for_rotations(-100, 20, %(rotations)s)",
+            place=listing.locate(statement.line),
+            rotations=join_tokens(call.arguments[-1]),
         )
 
 
@@ -257,9 +299,12 @@ def hint_about_curves(clues: Clues) -> Iterator[str]:
         steering = listing.code.number(call.arguments[0]) if call.arguments else None
         if corners and steering is not None and 0 < abs(steering) < 100:
             spot = 100 if steering > 0 else -100
-            yield (
-                f"{listing.locate(statement.line)} steers by {steering:g}, so the robot drives a curve. "
-                f"To turn on the spot, write {spot} instead of {steering:g}"
+            yield Sentence(
+                "%(place)s steers by %(steering)g, so the robot drives a curve. To turn on the spot, write "
+                "%(spot)s instead of %(steering)g",
+                place=listing.locate(statement.line),
+                steering=steering,
+                spot=spot,
             )
             return
 
@@ -279,14 +324,18 @@ def hint_about_speeds(clues: Clues) -> Iterator[str]:
             if left_speed is None or right_speed is None or left_speed * right_speed <= 0:
                 continue
             if left_speed < 0:
-                yield (
-                    f"{listing.locate(statement.line)} drives backwards: the speeds are negative. Write positive speeds"
+                yield Sentence(
+                    "%(place)s drives backwards: the speeds are negative. Write positive speeds",
+                    place=listing.locate(statement.line),
                 )
                 return
             if left_speed != right_speed:
-                yield (
-                    f"{listing.locate(statement.line)} gives the wheels the speeds {left_speed:g} and {right_speed:g}, "
-                    "so the robot drives a curve. To drive straight on, give both the same speed"
+                yield Sentence(
+                    "%(place)s gives the wheels the speeds %(left)g and %(right)g, so the robot "
+                    "drives a curve. To drive straight on, give both the same speed",
+                    place=listing.locate(statement.line),
+                    left=left_speed,
+                    right=right_speed,
                 )
                 return
 
@@ -340,8 +389,12 @@ def _find_compared_number(listing: Listing, statement: Statement, reading: str) 
 
 
 def _describe_impossible_threshold(listing: Listing, statement: Statement) -> str:
-    for reading, (minimum, maximum, unit) in READINGS.items():
+    for reading, (minimum, maximum, _) in READINGS.items():
         number = _find_compared_number(listing, statement, reading)
         if number is not None and not minimum <= number <= maximum:
-            return f"{reading} {unit}, so it is never near {number:g}. Choose a number within that range"
+            return Sentence(
+                "%(range)s, so it is never near %(number)g. Choose a number within that range",
+                range=describe_reading(reading),
+                number=number,
+            )
     return ""

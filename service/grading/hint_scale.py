@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_differences import describe_factor
+from service.grading.hint_loops import describe_reading
 from service.grading.hint_structure import collect_statements
+from sim.sentences import Sentence
 from submissions.criteria.reporting import Reports
 
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
@@ -39,8 +41,13 @@ def hint_about_wrong_scale(clues: Clues) -> Iterator[str]:
         advice = describe_factor((expected - criterion.leeway) / number, (expected + criterion.leeway) / number)
         if advice:
             listing, statement = calculation
-            calculation_text = join_tokens(statement.tokens)
-            yield f"{listing.locate(statement.line)}, {calculation_text}: the result is {number:g}. {advice}"
+            yield Sentence(
+                "%(place)s, %(code)s: the result is %(number)g. %(advice)s",
+                place=listing.locate(statement.line),
+                code=join_tokens(statement.tokens),
+                number=number,
+                advice=advice,
+            )
             return
 
 
@@ -59,9 +66,13 @@ def hint_about_raw_report(clues: Clues) -> Iterator[str]:
             statement = _find_raw_output(clues)
             if statement is not None and abs(numbers[0] - expected * _RAW_PER_PERCENT) < 1:
                 listing, line, reading = statement
-                yield (
-                    f"{listing.locate(line)} writes {numbers[0]:g}; expected {expected:g} %. {reading} goes from 0 to "
-                    "255. Write reflected_light_intensity_pc"
+                yield Sentence(
+                    "%(place)s writes %(number)g; expected %(expected)g %%. %(range)s. "
+                    "Write reflected_light_intensity_pc",
+                    place=listing.locate(line),
+                    number=numbers[0],
+                    expected=expected,
+                    range=describe_reading(reading),
                 )
                 return
 

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name, join_tokens
+from service.grading.hint_loops import describe_reading
 from service.grading.hint_structure import collect_statements, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, PROPERTIES, READINGS
+from sim.sentences import Sentence
 
 _IMMEDIATE_SECONDS = 0.5
 
@@ -15,42 +17,69 @@ _IMMEDIATE_SECONDS = 0.5
 def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
     """Yield a hint on a sensor loop whose condition is false at the start, so the robot stops immediately."""
     if clues.seconds <= _IMMEDIATE_SECONDS and not any(True for _ in clues.faults):
-        yield from (sentence + fix for sentence, fix in describe_skipped_loops(clues))
+        yield from (hint for _, hint in describe_skipped_loops(clues))
 
 
 def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
-    """Yield the first sensor loop after the motors are switched on: why it ends immediately, and the fix."""
+    """Yield why the first sensor loop after the motors are switched on ends immediately, and the same with a fix."""
     for listing, statement in collect_statements(clues):
         reading = next((token for token in statement.condition if token in PROPERTIES), "")
         is_driving = any(
             has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
         )
         if statement.keyword == "while" and reading and is_driving:
-            condition = join_tokens(statement.condition)
-            reason = f"{listing.locate(statement.line)}: the loop ends at once, because {condition} is false"
-            yield _explain_skipped_loop(listing, statement, reading, reason)
+            yield _explain_skipped_loop(listing, statement, reading)
             return
 
 
-def _explain_skipped_loop(listing: Listing, loop: Statement, reading: str, reason: str) -> tuple[str, str]:
-    """Return why a loop ends immediately, and the fix that its condition suggests."""
-    condition = join_tokens(loop.condition)
+def _explain_skipped_loop(listing: Listing, loop: Statement, reading: str) -> tuple[str, str]:
+    """Return why a loop ends immediately, and the same with the fix that its condition suggests."""
+    place, condition = listing.locate(loop.line), join_tokens(loop.condition)
     unbracketed_fix = describe_unbracketed_not(loop.condition)
     if unbracketed_fix:
-        return f"{reason} from the start. {unbracketed_fix}", ""
+        explanation = Sentence(
+            "%(place)s: the loop ends at once, because %(condition)s is false from the start. %(fix)s",
+            place=place,
+            condition=condition,
+            fix=unbracketed_fix,
+        )
+        return explanation, explanation
     flag = loop.condition[1] if loop.condition[0] == "not" and len(loop.condition) == 2 else ""
     decision = next((each for each in listing.code.list_body(loop) if flag and each.target == flag), None)
     if decision is not None:
-        explanation = f"{reason} in its second pass. Line {decision.line} makes {flag} true at the first reading"
-        return f"{explanation}. Print the values in {join_tokens(decision.tokens[2:])}, and check the condition", (
-            ": white has much red, green and blue. Compare red with green" if _reads_red_alone(decision) else ""
+        explanation = Sentence(
+            "%(place)s: the loop ends at once, because %(condition)s is false in its second pass. Line %(line)s makes "
+            "%(flag)s true at the first reading. Print the values in %(code)s, and check the condition",
+            place=place,
+            condition=condition,
+            line=decision.line,
+            flag=flag,
+            code=join_tokens(decision.tokens[2:]),
         )
-    unit = f" {reading} {READINGS[reading][2]}." if reading in READINGS else ""
+        if not _reads_red_alone(decision):
+            return explanation, explanation
+        return explanation, Sentence(
+            "%(hint)s: white has much red, green and blue. Compare red with green", hint=explanation
+        )
+    if reading in READINGS:
+        explanation = Sentence(
+            "%(place)s: the loop ends at once, because %(condition)s is false from the start. %(range)s. Check the "
+            "number",
+            place=place,
+            condition=condition,
+            range=describe_reading(reading),
+        )
+    else:
+        explanation = Sentence(
+            "%(place)s: the loop ends at once, because %(condition)s is false from the start. Check the number",
+            place=place,
+            condition=condition,
+        )
     is_single_comparison = not any(token in ("and", "or", "not") for token in loop.condition)
     opposite = condition.replace("<", ">") if "<" in condition else condition.replace(">", "<")
-    has_opposite = is_single_comparison and opposite != condition
-    fix = f", or write {opposite}" if has_opposite else ", and each part of the condition"
-    return f"{reason} from the start.{unit} Check the number", fix
+    if is_single_comparison and opposite != condition:
+        return explanation, Sentence("%(hint)s, or write %(condition)s", hint=explanation, condition=opposite)
+    return explanation, Sentence("%(hint)s, and each part of the condition", hint=explanation)
 
 
 def describe_unbracketed_not(condition: Sequence[str]) -> str:
@@ -60,9 +89,10 @@ def describe_unbracketed_not(condition: Sequence[str]) -> str:
     end = next((place for place, token in enumerate(condition) if token in ("and", "or")), None)
     if end is None or not any(token in ("<", ">", "<=", ">=", "==", "!=") for token in condition[:end]):
         return ""
-    return (
-        f"not counts only for {join_tokens(condition[1:end])}. If it is meant for both parts, write not "
-        f"({join_tokens(condition[1:])})"
+    return Sentence(
+        "not counts only for %(part)s. If it is meant for both parts, write not (%(whole)s)",
+        part=join_tokens(condition[1:end]),
+        whole=join_tokens(condition[1:]),
     )
 
 

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, is_name, join_tokens
-from service.grading.hint_loops import describe_discarded_value, suggest_correct_statement
+from service.grading.hint_discarded_values import describe_discarded_value, suggest_correct_statement
 from service.grading.hint_tables import ACTIONS, CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
+from sim.sentences import Sentence
 from submissions.criteria.code import Functions
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.line import Follows, Laps
@@ -41,7 +42,11 @@ def hint_about_missing_brackets(clues: Clues) -> Iterator[str]:
             name in function_names
             or (last_token in ACTIONS and (len(statement.tokens) > 1 or name in _OUTPUT_FUNCTIONS))
         ):
-            yield f"{listing.locate(statement.line)} names {name} without brackets, so it is not called. Write {name}()"
+            yield Sentence(
+                "%(place)s names %(name)s without brackets, so it is not called. Write %(name)s()",
+                place=listing.locate(statement.line),
+                name=name,
+            )
             return
 
 
@@ -49,10 +54,11 @@ def hint_about_replaced_function(clues: Clues) -> Iterator[str]:
     """Yield a hint on ``say = ...``, which overwrites a function instead of calling it."""
     for listing, statement in collect_statements(clues):
         if statement.target in _OUTPUT_FUNCTIONS and _TEXT.match(statement.tokens[2]):
-            value = join_tokens(statement.tokens[2:])
-            yield (
-                f"{listing.locate(statement.line)} replaces {statement.target} with a text, and does not call it. "
-                f"Write {statement.target}({value})"
+            yield Sentence(
+                "%(place)s replaces %(name)s with a text, and does not call it. Write %(name)s(%(value)s)",
+                place=listing.locate(statement.line),
+                name=statement.target,
+                value=join_tokens(statement.tokens[2:]),
             )
             return
 
@@ -81,9 +87,12 @@ def hint_about_uncalled_function(clues: Clues) -> Iterator[str]:
                 ""
             }
             if name not in used_names and effects and not effects & achieved_effects:
-                yield (
-                    f"{listing.locate(head.line)} defines {name}, but it is never called. Write {_format_call(head)} "
-                    "below the function, at the start of a line"
+                yield Sentence(
+                    "%(place)s defines %(name)s, but it is never called. Write %(call)s below the "
+                    "function, at the start of a line",
+                    place=listing.locate(head.line),
+                    name=name,
+                    call=_format_call(head),
                 )
                 return
 
@@ -109,7 +118,8 @@ def hint_about_discarded_value(clues: Clues) -> Iterator[str]:
     for listing, statement in (*collect_statements(clues), *called_statements):
         effect = describe_discarded_value(statement, listing.code)
         if effect:
-            yield f"{listing.locate(statement.line)}: {effect}. {suggest_correct_statement(statement)}"
+            place, advice = listing.locate(statement.line), suggest_correct_statement(statement)
+            yield Sentence("%(place)s: %(problem)s. %(advice)s", place=place, problem=effect, advice=advice)
             return
 
 
@@ -123,10 +133,11 @@ def hint_about_single_reading(clues: Clues) -> Iterator[str]:
             has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
         )
         if is_reading and is_driving and not listing.code.list_enclosing_loops(statement):
-            text = join_tokens(statement.tokens[1:])
-            yield (
-                f"{listing.locate(statement.line)} reads the sensor only once, because if does not repeat. To repeat "
-                f"as long as this is true, write while {text}"
+            yield Sentence(
+                "%(place)s reads the sensor only once, because if does not repeat. To repeat as long as this is "
+                "true, write while %(condition)s",
+                place=listing.locate(statement.line),
+                condition=join_tokens(statement.tokens[1:]),
             )
             return
 
@@ -143,9 +154,11 @@ def hint_about_stop_in_loop(clues: Clues) -> Iterator[str]:
         ):
             continue
         if any(has_motor_call(one, CONTINUOUS_MOVES) for one in listing.code.statements[: statement.number]):
-            yield (
-                f"{listing.locate(stop.line)} switches the motors off in the loop in line {statement.line}, so the "
-                "robot stops in the first pass of the loop. Move the line below the loop: remove its indentation"
+            yield Sentence(
+                "%(place)s switches the motors off in the loop in line %(line)s, so the robot stops in the "
+                "first pass of the loop. Move the line below the loop: remove its indentation",
+                place=listing.locate(stop.line),
+                line=statement.line,
             )
             return
 
@@ -170,9 +183,11 @@ def hint_about_unindented_statement(clues: Clues) -> Iterator[str]:
             and any(has_motor_call(one, LIMITED_MOVES) for one in listing.code.list_body(statement))
         )
         if is_variable_used or is_move_repeated:
-            yield (
-                f"{listing.locate(following.line)} is outside the loop of line {statement.line}, so it runs only once, "
-                "after it. If it belongs to the loop, indent it like the lines above"
+            yield Sentence(
+                "%(place)s is outside the loop of line %(line)s, so it runs only once, after it. If it belongs "
+                "to the loop, indent it like the lines above",
+                place=listing.locate(following.line),
+                line=statement.line,
             )
             return
 
@@ -188,9 +203,11 @@ def hint_about_output_below_loop(clues: Clues) -> Iterator[str]:
         body = listing.code.list_body(statement)
         names = {name for each in body for name in each.bound_names}
         if following.has_token(*names) and not any(map(_is_output, body)):
-            yield (
-                f"{listing.locate(following.line)} is below the loop of line {statement.line}, so it runs only once, "
-                "after it. Move it into the loop: indent it like the lines above, before the value changes"
+            yield Sentence(
+                "%(place)s is below the loop of line %(line)s, so it runs only once, after it. Move it into the "
+                "loop: indent it like the lines above, before the value changes",
+                place=listing.locate(following.line),
+                line=statement.line,
             )
             return
 

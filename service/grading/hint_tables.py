@@ -8,6 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Literal
+
+from service.language import translatable
 
 #: Advice on errors. Each pattern is searched in the error message plus a line feed and the line of code. In an advice,
 #: ``\g<1>`` is the first group of the pattern.
@@ -306,20 +309,20 @@ USAGE: Mapping[str, str] = MappingProxyType(
     }
 )
 
-#: Properties of sensors and motors: minimum, maximum and unit.
+#: Properties of sensors and motors: minimum, maximum, and a sentence on the range or unit.
 READINGS: Mapping[str, tuple[float, float, str]] = MappingProxyType(
     {
-        "reflected_light_intensity": (0, 255, "goes from 0 to 255"),
-        "reflected_light_intensity_pc": (0, 100, "is in percent, from 0 to 100"),
-        "full_reflected_light_intensity": (0, 100, "is in percent, from 0 to 100"),
-        "distance_centimeters": (0, 255, "is in centimetres"),
-        "distance_inches": (0, 101, "is in inches"),
-        "color": (0, 7, "is the number of a colour, from 0 to 7"),
-        "red": (0, 255, "goes from 0 to 255"),
-        "green": (0, 255, "goes from 0 to 255"),
-        "blue": (0, 255, "goes from 0 to 255"),
-        "angle": (-1e9, 1e9, "is in degrees, clockwise"),
-        "position": (-1e9, 1e9, "is in degrees"),
+        "reflected_light_intensity": (0, 255, translatable("%(reading)s goes from 0 to 255")),
+        "reflected_light_intensity_pc": (0, 100, translatable("%(reading)s is in percent, from 0 to 100")),
+        "full_reflected_light_intensity": (0, 100, translatable("%(reading)s is in percent, from 0 to 100")),
+        "distance_centimeters": (0, 255, translatable("%(reading)s is in centimetres")),
+        "distance_inches": (0, 101, translatable("%(reading)s is in inches")),
+        "color": (0, 7, translatable("%(reading)s is the number of a colour, from 0 to 7")),
+        "red": (0, 255, translatable("%(reading)s goes from 0 to 255")),
+        "green": (0, 255, translatable("%(reading)s goes from 0 to 255")),
+        "blue": (0, 255, translatable("%(reading)s goes from 0 to 255")),
+        "angle": (-1e9, 1e9, translatable("%(reading)s is in degrees, clockwise")),
+        "position": (-1e9, 1e9, translatable("%(reading)s is in degrees")),
     }
 )
 #: Other names that are read without brackets.
@@ -340,12 +343,12 @@ PROPERTIES = frozenset(READINGS) | {
     "distance_inches_continuous",
 }
 
-#: Calls with a time or an amount as their last argument: largest plausible value, its unit, and the fix.
-AMOUNTS: Mapping[str, tuple[float, str, str]] = MappingProxyType(
+#: Calls with a time or an amount as their last argument: largest plausible value, and its unit.
+AMOUNTS: Mapping[str, tuple[float, Literal["seconds", "rotations"]]] = MappingProxyType(
     {
-        "sleep": (100, "seconds", "milliseconds"),
-        "on_for_seconds": (100, "seconds", "milliseconds"),
-        "on_for_rotations": (30, "rotations", "degrees"),
+        "sleep": (100, "seconds"),
+        "on_for_seconds": (100, "seconds"),
+        "on_for_rotations": (30, "rotations"),
     }
 )
 
