@@ -16,7 +16,9 @@ from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES
 from service.grading.judging.geometry import to_relative_position
+from service.language import translatable
 from sim.recording import Pose, Recording
+from sim.sentences import Sentence
 from submissions.criteria.ending import EndPose
 from submissions.criteria.motion import Excursions
 from submissions.criteria.sequence import WordSequence
@@ -40,10 +42,13 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
         pass_counts = {str(int(end)), str(int(end) - 1)} if end is not None and end > 1 else set()
         number_sets = (set(re.findall(r"\d+", _join_messages(clues, one.id))) for one in clues.lost)
         if end is not None and pass_counts and not is_used and any(pass_counts <= numbers for numbers in number_sets):
-            end_code = join_tokens(call.arguments[1])
-            yield (
-                f"{listing.locate(statement.line)}: range(1, {end_code}) counts from 1 to {end - 1:g}, so the loop "
-                f"runs {end - 1:g} times. To run {end:g} times, write range({end_code})"
+            yield Sentence(
+                "%(place)s: range(1, %(end)s) counts from 1 to %(last)g, so the loop runs %(last)g times. To run "
+                "%(count)g times, write range(%(end)s)",
+                place=listing.locate(statement.line),
+                end=join_tokens(call.arguments[1]),
+                last=end - 1,
+                count=end,
             )
             return
 
@@ -69,10 +74,16 @@ def hint_about_range_step(clues: Clues) -> Iterator[str]:
             ):
                 continue
             arguments = (*map(join_tokens, call.arguments[:2]), str(expected - last_number))
-            range_call = f"range({format_arguments(call.arguments)})"
-            yield (
-                f"{listing.locate(statement.line)}: {range_call} counts in steps of {step:g}, so {actual} comes after "
-                f"{last_number}, and not {expected}. The third number is the step: write range({', '.join(arguments)})"
+            yield Sentence(
+                "%(place)s: range(%(arguments)s) counts in steps of %(step)g, so %(actual)s comes after %(last)s, and "
+                "not %(expected)s. The third number is the step: write range(%(fixed)s)",
+                place=listing.locate(statement.line),
+                arguments=format_arguments(call.arguments),
+                step=step,
+                actual=actual,
+                last=last_number,
+                expected=expected,
+                fixed=", ".join(arguments),
             )
             return
 
@@ -90,9 +101,15 @@ def hint_about_large_step(clues: Clues) -> Iterator[str]:
             start, end, step = (int(each) for each in numbers if each is not None)
             left_out = sorted(required & set(range(start, end)) - set(range(start, end, step))) if step > 1 else []
             if left_out:
-                yield (
-                    f"{listing.locate(statement.line)}: range({format_arguments(call.arguments)}) counts in steps of "
-                    f"{step}, and leaves out {left_out[0]}. Write range({start}, {end})"
+                yield Sentence(
+                    "%(place)s: range(%(arguments)s) counts in steps of %(step)s, and leaves out %(number)s. "
+                    "Write range(%(start)s, %(end)s)",
+                    place=listing.locate(statement.line),
+                    arguments=format_arguments(call.arguments),
+                    step=step,
+                    number=left_out[0],
+                    start=start,
+                    end=end,
                 )
                 return
 
@@ -111,10 +128,13 @@ def hint_about_first_value(clues: Clues) -> Iterator[str]:
             continue
         is_empty = any(one.tokens == (name, "=", "None") and not one.indent for one in listing.code.statements)
         if is_empty and any(one.keyword in LOOPS for one in listing.code.list_enclosing(statement)):
-            yield (
-                f"{listing.locate(statement.line)} sets {name} again each time that the if in line {enclosing.line} is "
-                "true, so it "
-                f'has the last value. For the first, write "if {join_tokens(enclosing.condition)} and {name} is None:"'
+            yield Sentence(
+                "%(place)s sets %(name)s again each time that the if in line %(line)s is true, so it has the "
+                'last value. For the first, write "if %(condition)s and %(name)s is None:"',
+                place=listing.locate(statement.line),
+                name=name,
+                line=enclosing.line,
+                condition=join_tokens(enclosing.condition),
             )
             return
 
@@ -126,9 +146,9 @@ def hint_about_first_message(clues: Clues) -> Iterator[str]:
     for listing, statement in collect_statements(clues):
         for index, token in enumerate(statement.tokens):
             if token.strip("\"'") == "messages" and statement.tokens[index + 1 : index + 5] == ("]", "[", "0", "]"):
-                yield (
-                    f"{listing.locate(statement.line)} takes the first message of the queue, [0]. Write [-1] for the "
-                    "last"
+                yield Sentence(
+                    "%(place)s takes the first message of the queue, [0]. Write [-1] for the last",
+                    place=listing.locate(statement.line),
                 )
                 return
 
@@ -142,9 +162,19 @@ def hint_about_spoken_name(clues: Clues) -> Iterator[str]:
             is_output = call.name in ("say", "print") and name in (*clues.spoken, *clues.printed)
             if is_output and text[:1] in ("'", '"') and _is_variable(name, listing):
                 arguments = format_arguments((("str", "(", name, ")"), *call.arguments[1:]))
-                yield (
-                    f"{listing.locate(statement.line)} {call.name}s the word {text} and not the value of {name}, "
-                    f"because it is in quotes. Write {call.name}({arguments})"
+                template = (
+                    translatable(
+                        "%(place)s says the word %(text)s and not the value of %(name)s, because it is in quotes. "
+                        "Write say(%(arguments)s)"
+                    )
+                    if call.name == "say"
+                    else translatable(
+                        "%(place)s prints the word %(text)s and not the value of %(name)s, because it is in quotes. "
+                        "Write print(%(arguments)s)"
+                    )
+                )
+                yield Sentence(
+                    template, place=listing.locate(statement.line), text=text, name=name, arguments=arguments
                 )
                 return
 
@@ -168,10 +198,14 @@ def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
             for parameter in _list_parameters(head):
                 if not any(each.has_token(parameter) for each in body):
                     call = next(one for one in drive_statement.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
-                    amount = join_tokens(call.arguments[-1]) if call.arguments else "the number"
-                    yield (
-                        f"{listing.locate(drive_statement.line)}: {name} never uses its parameter {parameter}, so it "
-                        f"does the same with each value. Write {parameter} instead of {amount} if that is meant"
+                    amount = join_tokens(call.arguments[-1]) if call.arguments else Sentence("the number")
+                    yield Sentence(
+                        "%(place)s: %(name)s never uses its parameter %(parameter)s, so it does the same with "
+                        "each value. Write %(parameter)s instead of %(amount)s if that is meant",
+                        place=listing.locate(drive_statement.line),
+                        name=name,
+                        parameter=parameter,
+                        amount=amount,
                     )
                     return
 
@@ -184,17 +218,19 @@ def hint_about_missing_reverse(clues: Clues) -> Iterator[str]:
     calls = [call for _, each in moves for call in each.calls if call.name.rpartition(".")[2] in LIMITED_MOVES]
     for listing, statement in moves:
         if any(_has_opposite_speeds(listing, call) for call in statement.calls):
-            yield (
-                f"{listing.locate(statement.line)} turns the robot on the spot, because only one speed has a minus. To "
-                "drive backwards, write - before both speeds"
+            yield Sentence(
+                "%(place)s turns the robot on the spot, because only one speed has a minus. To drive backwards, "
+                "write - before both speeds",
+                place=listing.locate(statement.line),
             )
             return
     has_turn = any("turn" in call.name or "-" in "".join(map("".join, call.arguments)) for call in calls)
     if len(moves) > 1 and not has_turn:
         listing, statement = moves[-1]
-        yield (
-            f"{listing.locate(statement.line)} drives forwards like the lines before it, so the robot never comes "
-            "back. Write - before both speeds to drive backwards"
+        yield Sentence(
+            "%(place)s drives forwards like the lines before it, so the robot never comes back. Write - before "
+            "both speeds to drive backwards",
+            place=listing.locate(statement.line),
         )
 
 
@@ -221,11 +257,18 @@ def hint_about_mirrored_end(clues: Clues) -> Iterator[str]:
             error = math.hypot(target[0] - end[0], target[1] + end[1])
             if abs(target[1]) > _AWAY and target[1] * end[1] < 0 and error < max(criterion.tolerance, _AWAY):
                 listing, statement = turn
-                side = "left" if target[1] > 0 else "right"
-                yield (
-                    f"{listing.locate(statement.line)} turns the robot to the wrong side: it ends as far from its way "
-                    f"as the target, but on the other side. Turn {side} there"
+                template = (
+                    translatable(
+                        "%(place)s turns the robot to the wrong side: it ends as far from its way as the target, but "
+                        "on the other side. Turn left there"
+                    )
+                    if target[1] > 0
+                    else translatable(
+                        "%(place)s turns the robot to the wrong side: it ends as far from its way as the target, but "
+                        "on the other side. Turn right there"
+                    )
                 )
+                yield Sentence(template, place=listing.locate(statement.line))
                 return
 
 

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, join_tokens
+from service.language import translatable
 from sim.recording import Fault
+from sim.sentences import Sentence
 
 _CALL = re.compile(r"(?<![.\w])(\w+)\(")
 #: Python's form of constants from JSON and other languages.
@@ -50,13 +52,22 @@ def advise_on_owner(fault: Fault, clues: Clues, *_: object) -> str:
     owners = _OWNERS.get(name, ()) if fault.who == "program" and clues.preamble == "preloaded" else ()
     if not owners:
         return ""
-    return f"{name} belongs to {' and '.join(owners)}: write {' or '.join(f'{each}.{name}' for each in owners)}."
+    if len(owners) == 1:
+        return Sentence("%(name)s belongs to %(owner)s: write %(owner)s.%(name)s.", name=name, owner=owners[0])
+    return Sentence(
+        "%(name)s belongs to %(first)s and %(second)s: write %(first)s.%(name)s or %(second)s.%(name)s.",
+        name=name,
+        first=owners[0],
+        second=owners[1],
+    )
 
 
 def advise_on_constant(fault: Fault, *_: object) -> str:
     """Return advice on ``null`` or ``true``, as written in JSON."""
     name = _find_undefined_name(fault)
-    return f"Write {_CONSTANTS[name]} instead of {name}." if name in _CONSTANTS else ""
+    if name not in _CONSTANTS:
+        return ""
+    return Sentence("Write %(right)s instead of %(wrong)s.", right=_CONSTANTS[name], wrong=name)
 
 
 def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
@@ -74,16 +85,36 @@ def advise_on_other_process(fault: Fault, clues: Clues, listing: Listing | None,
         or next(_collect_definitions(name, _list_process_listings(listing, clues)), None)
     ):
         return ""
-    owner = defining_listing.name.capitalize() if defining_listing.part is None else defining_listing.name
     if definition.keyword in ("import", "from"):
-        process_name = "the robot program" if not is_robot else "the responder"
-        return (
-            f"The import in {defining_listing.name} is only for {process_name}. Add {join_tokens(definition.tokens)} "
-            f"at the top of {listing.name}."
+        template = (
+            translatable("The import in %(source)s is only for the responder. Add %(code)s at the top of %(target)s.")
+            if is_robot
+            else translatable(
+                "The import in %(source)s is only for the robot program. Add %(code)s at the top of %(target)s."
+            )
         )
-    explanation = "a robot program does not see it" if is_robot else "the responder does not see it"
-    position = ", below its first line" if listing.part is None and is_robot else ""
-    return f"{owner} defines {name}, but {explanation}. Define {name} in {listing.name} as well{position}."
+        source, target = defining_listing.locate(None), listing.locate(None)
+        return Sentence(template, source=source, code=join_tokens(definition.tokens), target=target)
+    if not is_robot:
+        template = translatable(
+            "%(owner)s defines %(name)s, but the responder does not see it. Define %(name)s in %(target)s as well."
+        )
+    elif listing.part is None:
+        template = translatable(
+            "%(owner)s defines %(name)s, but a robot program does not see it. Define %(name)s in %(target)s as well, "
+            "below its first line."
+        )
+    else:
+        template = translatable(
+            "%(owner)s defines %(name)s, but a robot program does not see it. Define %(name)s in %(target)s as well."
+        )
+    owner = _name_at_start(defining_listing) if defining_listing.part is None else defining_listing.name
+    return Sentence(template, owner=owner, name=name, target=listing.locate(None))
+
+
+def _name_at_start(cell: Listing) -> str:
+    """Return the name of a cell for the start of a sentence."""
+    return Sentence("Cell %(number)s", number=cell.name.removeprefix("cell "))
 
 
 def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
@@ -95,8 +126,12 @@ def advise_on_later_cell(fault: Fault, clues: Clues, listing: Listing | None, _:
     later_cell = next((each for each, _ in _collect_definitions(name, cells[cells.index(listing) + 1 :])), None)
     if later_cell is None:
         return ""
-    return (
-        f"{later_cell.name.capitalize()} defines {name}, but runs later. Move {later_cell.name} above {listing.name}."
+    return Sentence(
+        "%(owner)s defines %(name)s, but runs later. Move %(later)s above %(earlier)s.",
+        owner=_name_at_start(later_cell),
+        name=name,
+        later=later_cell.locate(None),
+        earlier=listing.locate(None),
     )
 
 
@@ -107,8 +142,11 @@ def advise_on_later_line(fault: Fault, _: Clues, listing: Listing | None, statem
         return ""
     for following in listing.code.list_following(statement):
         if not following.indent and following.keyword == "def" and name in following.bound_names:
-            return (
-                f"Line {following.line} defines {name}, but is below. Move line {statement.line} below the definition."
+            return Sentence(
+                "Line %(line)s defines %(name)s, but is below. Move line %(caller)s below the definition.",
+                line=following.line,
+                name=name,
+                caller=statement.line,
             )
     return ""
 
@@ -129,14 +167,20 @@ def advise_on_overwritten_name(fault: Fault, clues: Clues, listing: Listing | No
         for other_listing in _list_process_listings(listing, clues):
             for assignment in other_listing.code.statements:
                 if assignment.target == name and _is_shared_name(name, listing, clues):
-                    location = (
-                        f"Line {assignment.line}"
+                    template = (
+                        translatable("Line %(line)s gives %(name)s another value: %(code)s. Choose another name there.")
                         if other_listing is listing
-                        else f"Line {assignment.line} of {other_listing.name}"
+                        else translatable(
+                            "Line %(line)s of %(file)s gives %(name)s another value: %(code)s. Choose another name "
+                            "there."
+                        )
                     )
-                    return (
-                        f"{location} gives {name} another value: {join_tokens(assignment.tokens)}. Choose another "
-                        "name there."
+                    return Sentence(
+                        template,
+                        line=assignment.line,
+                        file=other_listing.locate(None),
+                        name=name,
+                        code=join_tokens(assignment.tokens),
                     )
     return ""
 

@@ -15,7 +15,10 @@ from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_tables import USAGE
+from service.grading.judging.message_parts import add_place
+from service.language import translatable
 from sim.recording import Fault
+from sim.sentences import Sentence
 
 _KEYWORDS: Mapping[str, tuple[str, ...]] = MappingProxyType({"say": ("txt", "wait", "show")})
 _MOTOR_KEYWORDS = (
@@ -62,8 +65,14 @@ def advise_on_text_operand(fault: Fault, _: Clues, listing: Listing | None, stat
         match = _DIGITS.match(assignment.tokens[2]) if len(assignment.tokens) == 3 else None
         if match is not None:
             name, text = assignment.target, assignment.tokens[2]
-            reason = f"Line {assignment.line} makes {name} a text, because {text} is in quotes"
-            return f"{reason}. Write {name} = {match[1]} there."
+            return Sentence(
+                "Line %(line)s makes %(name)s a text, because %(text)s is in quotes. Write %(name)s = %(number)s "
+                "there.",
+                line=assignment.line,
+                name=name,
+                text=text,
+                number=match[1],
+            )
     return ""
 
 
@@ -75,9 +84,12 @@ def advise_on_list_operand(fault: Fault, _: Clues, listing: Listing | None, stat
     indirect_assignments = [one for each in direct_assignments for one in _list_assignments(listing, each)]
     for assignment in (*direct_assignments, *indirect_assignments):
         if assignment.tokens[2] == "[" and assignment.tokens[-1] == "]":
-            name = assignment.target
-            fix = f"Take one entry, as in {name}[0], or write the list behind for {name} in"
-            return f"Line {assignment.line} makes {name} a whole list. {fix}."
+            return Sentence(
+                "Line %(line)s makes %(name)s a whole list. Take one entry, as in %(name)s[0], or write the list "
+                "behind for %(name)s in.",
+                line=assignment.line,
+                name=assignment.target,
+            )
     return ""
 
 
@@ -93,7 +105,8 @@ def advise_on_decimal_comma(fault: Fault, _: Clues, listing: Listing | None, sta
     for assignment in _list_assignments(listing, statement):
         numbers = find_decimal_comma(tuple((token,) for token in assignment.tokens[2:] if token != ","))
         if numbers is not None and len(assignment.tokens) == 5:
-            return f"In line {assignment.line}, {describe_decimal_comma(*numbers)}"
+            explanation = describe_decimal_comma(*numbers)
+            return Sentence("In line %(line)s, %(explanation)s", line=assignment.line, explanation=explanation)
     return ""
 
 
@@ -107,7 +120,11 @@ def find_decimal_comma(arguments: tuple[tuple[str, ...], ...]) -> tuple[str, str
 
 def describe_decimal_comma(whole: str, fraction: str) -> str:
     """Return a sentence on a number with a comma."""
-    return f"{whole},{fraction} is two numbers. Python has a decimal point: write {whole}.{fraction}."
+    return Sentence(
+        "%(whole)s,%(fraction)s is two numbers. Python has a decimal point: write %(whole)s.%(fraction)s.",
+        whole=whole,
+        fraction=fraction,
+    )
 
 
 def advise_on_device(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -119,8 +136,12 @@ def advise_on_device(fault: Fault, _: Clues, listing: Listing | None, statement:
     if device is None:
         return ""
     name, reading = device
-    part = "motor" if values[0] == "LargeMotor" else "sensor"
-    return f"{name} is the whole {part}. Write what to read, such as {name}.{reading}."
+    template = (
+        translatable("%(name)s is the whole motor. Write what to read, such as %(name)s.%(reading)s.")
+        if values[0] == "LargeMotor"
+        else translatable("%(name)s is the whole sensor. Write what to read, such as %(name)s.%(reading)s.")
+    )
+    return Sentence(template, name=name, reading=reading)
 
 
 def find_device(listing: Listing, statement: Statement, kind: str = "") -> tuple[str, str] | None:
@@ -150,7 +171,10 @@ def advise_on_whole_object(fault: Fault, clues: Clues, _: Listing | None, statem
     used_keys = {token.strip("\"'") for token in statement.tokens}
     answers = (text for text in reversed(clues.answers) if text.startswith(JSON))
     keys = (key for text in answers for key in _KEY.findall(text) if key not in used_keys)
-    return f'It is an object and no text: take one of its values with its key, as in ["{next(keys, "message")}"].'
+    return Sentence(
+        'It is an object and no text: take one of its values with its key, as in ["%(key)s"].',
+        key=next(keys, "message"),
+    )
 
 
 def advise_on_missing_alias(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
@@ -162,8 +186,13 @@ def advise_on_missing_alias(fault: Fault, _: Clues, listing: Listing | None, __:
     statement = f"import {module} as {values[0]}"
     for each in listing.code.statements:
         if each.keyword in ("import", "from") and each.tokens[1] == module:
-            return f"Line {each.line} imports {module} under another name. Write {statement} there."
-    return f"Add {statement} at the top of the program."
+            return Sentence(
+                "Line %(line)s imports %(module)s under another name. Write %(code)s there.",
+                line=each.line,
+                module=module,
+                code=statement,
+            )
+    return Sentence("Add %(code)s at the top of the program.", code=statement)
 
 
 def advise_on_keyword(fault: Fault, _: Clues, listing: Listing | None, __: Statement | None) -> str:
@@ -175,7 +204,9 @@ def advise_on_keyword(fault: Fault, _: Clues, listing: Listing | None, __: State
     heads = [each for each in listing.code.list_functions() if each.tokens[1] == function]
     names = heads[0].tokens[3:] if heads else _KEYWORDS.get(function, _MOTOR_KEYWORDS)
     similar = difflib.get_close_matches(name.lower(), [each for each in names if is_name(each)], 1)
-    return f"Did you mean {similar[0]}=?" if similar else f"{function} has no {name}: leave {name}=... out."
+    if similar:
+        return Sentence("Did you mean %(code)s?", code=f"{similar[0]}=")
+    return Sentence("%(function)s has no %(name)s: leave %(name)s=... out.", function=function, name=name)
 
 
 def advise_on_short_list(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -187,9 +218,12 @@ def advise_on_short_list(fault: Fault, _: Clues, listing: Listing | None, statem
     for assignment in _list_assignments(listing, statement):
         entries = [token for token in assignment.tokens[3:] if token[:1] in ("'", '"')]
         if assignment.tokens[2] == "[" and entries:
-            return (
-                f"{assignment.target} has {len(entries)} names, and the network answered with a larger number. Add the "
-                f"missing names in line {assignment.last_line}, in the order of the network."
+            return Sentence(
+                "%(name)s has %(count)s names, and the network answered with a larger number. Add the missing "
+                "names in line %(line)s, in the order of the network.",
+                name=assignment.target,
+                count=len(entries),
+                line=assignment.last_line,
             )
     return ""
 
@@ -205,8 +239,11 @@ def advise_on_parameter(fault: Fault, _: Clues, listing: Listing | None, stateme
     name = head.tokens[3]
     if any(each.has_token(name) for each in listing.code.list_body(head)):
         return ""
-    return (
-        f"Line {head.line} calls the parameter {name}: write {name} in place of {values[0]}, or rename the parameter."
+    return Sentence(
+        "Line %(line)s calls the parameter %(name)s: write %(name)s in place of %(wrong)s, or rename the parameter.",
+        line=head.line,
+        name=name,
+        wrong=values[0],
     )
 
 
@@ -219,8 +256,10 @@ def advise_on_mean_axis(fault: Fault, _: Clues, listing: Listing | None, __: Sta
         for call in statement.calls:
             axis = next((each[2] for each in call.arguments if each[:2] == ("axis", "=") and len(each) == 3), "")
             if call.name.rpartition(".")[2] == "mean" and axis in ("0", "1"):
-                return (
-                    f"Line {statement.line} takes the mean over axis {axis}. The colours are in axis 2: write axis=2."
+                return Sentence(
+                    "Line %(line)s takes the mean over axis %(axis)s. The colours are in axis 2: write axis=2.",
+                    line=statement.line,
+                    axis=axis,
                 )
     return ""
 
@@ -232,11 +271,18 @@ def advise_on_sample_count(fault: Fault, *_: object) -> str:
         return ""
     images, labels = int(values[0]), int(values[1])
     if images > labels > 0 and images % labels == 0:
-        return (
-            f"There are {images} rows for {labels} labels, so each image became {images // labels} rows. Write "
-            ".reshape(len(images), -1) for one row for each image."
+        return Sentence(
+            "There are %(rows)s rows for %(labels)s labels, so each image became %(share)s rows. Write "
+            ".reshape(len(images), -1) for one row for each image.",
+            rows=images,
+            labels=labels,
+            share=images // labels,
         )
-    return f"There are {images} images and {labels} labels: fit needs one label for each image, in the same order."
+    return Sentence(
+        "There are %(images)s images and %(labels)s labels: fit needs one label for each image, in the same order.",
+        images=images,
+        labels=labels,
+    )
 
 
 def advise_on_narrow_except(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -251,9 +297,12 @@ def advise_on_narrow_except(fault: Fault, _: Clues, listing: Listing | None, sta
         names = [token for token in handler.tokens[1:] if is_name(token) and token != "as"]
         if handler.tokens[1] == "(" or len(names) == 1:
             error = "ValueError" if values[0] == "JSONDecodeError" else values[0]
-            caught = join_tokens(handler.tokens[1:-1])
-            listed = ", ".join(dict.fromkeys((*names, error)))
-            return f"The except in line {handler.line} catches {caught} only. Write ({listed}) after except."
+            return Sentence(
+                "The except in line %(line)s catches %(caught)s only. Write (%(listed)s) after except.",
+                line=handler.line,
+                caught=join_tokens(handler.tokens[1:-1]),
+                listed=", ".join(dict.fromkeys((*names, error))),
+            )
     return ""
 
 
@@ -267,9 +316,12 @@ def check_number_as_text(listing: Listing, statement: Statement) -> str:
         if match is None or sign not in ("==", "!=") or not values or is_changed:
             continue
         if all(_NUMBER.match(one) or one in (name, "+", "-", "*") for value in values for one in value):
-            return (
-                f"{listing.locate(statement.line)}: {name} is a number, and never equals the text {text}. Write "
-                f"{match[1]} without quotes"
+            return Sentence(
+                "%(place)s: %(name)s is a number, and never equals the text %(text)s. Write %(number)s without quotes",
+                place=listing.locate(statement.line),
+                name=name,
+                text=text,
+                number=match[1],
             )
     return ""
 
@@ -280,7 +332,7 @@ def check_decimal_comma(listing: Listing, statement: Statement) -> str:
         count = USAGE[call.name].count(",") + 1 if call.name in USAGE else None
         numbers = find_decimal_comma(call.arguments) if len(call.arguments) - 1 == count else None
         if numbers is not None and call.name.rpartition(".")[2] != "on":
-            return f"{listing.locate(statement.line)}: {describe_decimal_comma(*numbers)}"
+            return add_place(listing.locate(statement.line), describe_decimal_comma(*numbers))
     return ""
 
 
@@ -296,7 +348,11 @@ def check_second_text(listing: Listing, statement: Statement) -> str:
         texts = ' + " " + '.join(
             join_tokens(each) if each[0][:1] in "\"'" else f"str({join_tokens(each)})" for each in values
         )
-        return f"{listing.locate(statement.line)}: say takes one text, and ignores the second. Write say({texts})"
+        return Sentence(
+            "%(place)s: say takes one text, and ignores the second. Write say(%(text)s)",
+            place=listing.locate(statement.line),
+            text=texts,
+        )
     return ""
 
 
@@ -314,10 +370,18 @@ def check_robot_number(listing: Listing, statement: Statement) -> str:
             continue
         name = "sender" if tokens[index - 1] == "sender" else "robot_number()"
         if match is None:
-            return f"{listing.locate(statement.line)}: {name} is never {number}. The robots have the numbers 1 and 2"
-        return (
-            f"{listing.locate(statement.line)}: {name} is a number, and never equals the text {tokens[index + 1]}. "
-            f"Write {number} without quotes"
+            return Sentence(
+                "%(place)s: %(name)s is never %(number)s. The robots have the numbers 1 and 2",
+                place=listing.locate(statement.line),
+                name=name,
+                number=number,
+            )
+        return Sentence(
+            "%(place)s: %(name)s is a number, and never equals the text %(text)s. Write %(number)s without quotes",
+            place=listing.locate(statement.line),
+            name=name,
+            text=tokens[index + 1],
+            number=number,
         )
     return ""
 

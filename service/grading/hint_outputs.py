@@ -13,6 +13,7 @@ from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_operands import find_device
 from service.grading.hint_structure import collect_statements
 from service.grading.judging.message_parts import quote_text
+from sim.sentences import Sentence
 from submissions.criteria.reporting import Reports
 from submissions.criteria.texts import TextSequence
 
@@ -33,15 +34,19 @@ def hint_about_printed_object(clues: Clues) -> Iterator[str]:
             device = find_device(listing, statement)
             if device is not None:
                 name, reading = device
-                yield (
-                    f"{listing.locate(statement.line)} writes the sensor itself and not what it reads. Write "
-                    f"{name}.{reading} in place of {name}"
+                yield Sentence(
+                    "%(place)s writes the sensor itself and not what it reads. Write %(name)s.%(reading)s in "
+                    "place of %(name)s",
+                    place=listing.locate(statement.line),
+                    name=name,
+                    reading=reading,
                 )
                 return
             if match["kind"] in ("function", "bound method"):
-                yield (
-                    f"{listing.locate(statement.line)} writes {quote_text(match[0])}: a function is named, but not "
-                    "called. Write () behind its name"
+                yield Sentence(
+                    "%(place)s writes %(text)s: a function is named, but not called. Write () behind its name",
+                    place=listing.locate(statement.line),
+                    text=quote_text(match[0]),
                 )
                 return
 
@@ -57,9 +62,12 @@ def hint_about_missing_else(clues: Clues) -> Iterator[str]:
         body = [each for each in listing.code.list_body(statement) if each.parent == statement.number]
         texts = [_get_literal(each) for each in (*body[-1:], following)]
         if len(texts) == 2 and all(texts) and texts[0] != texts[1] and _come_together(texts, clues):
-            yield (
-                f"{listing.locate(following.line)} runs after the if in line {statement.line} as well, so both texts "
-                f"come. Write else: above line {following.line}, and indent line {following.line}"
+            yield Sentence(
+                "%(place)s runs after the if in line %(line)s as well, so both texts come. Write else: above "
+                "line %(second)s, and indent line %(second)s",
+                place=listing.locate(following.line),
+                line=statement.line,
+                second=following.line,
             )
             return
 
@@ -93,9 +101,12 @@ def hint_about_swapped_sides(clues: Clues) -> Iterator[str]:
                 continue
             left, right = (_find_parameter(each, head) for each in call.arguments[:2])
             if "right" in left.lower() and "left" in right.lower():
-                yield (
-                    f"{listing.locate(statement.line)} gives {left} to the left motor and {right} to the right one. "
-                    f"Exchange them: the first speed is that of the left motor"
+                yield Sentence(
+                    "%(place)s gives %(left)s to the left motor and %(right)s to the right one. Exchange them: "
+                    "the first speed is that of the left motor",
+                    place=listing.locate(statement.line),
+                    left=left,
+                    right=right,
                 )
                 return
 

@@ -14,6 +14,7 @@ from service.grading.hint_motion import measure_missing_way
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
 from sim.recording import Message
+from sim.sentences import Sentence
 from submissions.criteria.motion import Excursions
 from submissions.criteria.unreliable_channel import Resends
 
@@ -31,11 +32,15 @@ def hint_about_kept_value(clues: Clues) -> Iterator[str]:
         for name in dict.fromkeys(token for token in inner.condition if is_name(token) and token not in _COUNTED):
             first_assignment = _find_kept_assignment(listing.code, name, inner, outer)
             if first_assignment is not None:
-                start = join_tokens(first_assignment.tokens)
-                yield (
-                    f"{listing.locate(inner.line)}: {join_tokens(inner.tokens)[:-1]} runs in the first pass of line "
-                    f"{outer.line} only, because {name} keeps its last value. Move {start} from line "
-                    f"{first_assignment.line} into the loop, below line {outer.line}"
+                yield Sentence(
+                    "%(place)s: %(code)s runs in the first pass of line %(line)s only, because %(name)s keeps "
+                    "its last value. Move %(start)s from line %(start_line)s into the loop, below line %(line)s",
+                    place=listing.locate(inner.line),
+                    code=join_tokens(inner.tokens)[:-1],
+                    line=outer.line,
+                    name=name,
+                    start=join_tokens(first_assignment.tokens),
+                    start_line=first_assignment.line,
                 )
                 return
 
@@ -72,9 +77,13 @@ def hint_about_zero_pass(clues: Clues) -> Iterator[str]:
             if each.name.rpartition(".")[2] in LIMITED_MOVES and each.arguments
         )
         if end and any(_is_multiple(each, variable) or {*each} & lengths or each == (variable,) for each in amounts):
-            yield (
-                f"{listing.locate(statement.line)}: range({end:g}) begins with 0, so {variable} is 0 in the first pass "
-                f"and the robot does not move in it. Write range(1, {end + 1:g})"
+            yield Sentence(
+                "%(place)s: range(%(end)g) begins with 0, so %(name)s is 0 in the first pass and the robot "
+                "does not move in it. Write range(1, %(right)g)",
+                place=listing.locate(statement.line),
+                end=end,
+                name=variable,
+                right=end + 1,
             )
             return
 
@@ -92,9 +101,13 @@ def hint_about_short_loop(clues: Clues) -> Iterator[str]:
         count = listing.code.number(call.arguments[0]) if call is not None and len(call.arguments) == 1 else None
         is_driving = any(has_motor_call(each, CONTINUOUS_MOVES) for each in listing.code.statements[: loop.number])
         if count and is_driving:
-            yield (
-                f"{listing.locate(loop.line)}: the loop ends {missing_way:.0f} mm before the middle of the area where "
-                f"the robot should end. Change {count:g} to about {count * (1 + missing_way / covered_way):.0f}"
+            yield Sentence(
+                "%(place)s: the loop ends %(distance).0f mm before the middle of the area where the robot "
+                "should end. Change %(count)g to about %(right).0f",
+                place=listing.locate(loop.line),
+                distance=missing_way,
+                count=count,
+                right=count * (1 + missing_way / covered_way),
             )
             return
 
@@ -116,9 +129,14 @@ def hint_about_added_factor(clues: Clues) -> Iterator[str]:
             continue
         body = listing.code.list_body(loop)
         if any(has_motor_call(each, LIMITED_MOVES) and each.has_token(statement.target) for each in body):
-            yield (
-                f"{listing.locate(statement.line)} adds: {join_tokens(statement.tokens)}. For two or three times a "
-                f"distance, multiply: write {statement.target} = {value[0]} * {value[2]}"
+            yield Sentence(
+                "%(place)s adds: %(code)s. For two or three times a distance, multiply: write %(name)s = "
+                "%(first)s * %(second)s",
+                place=listing.locate(statement.line),
+                code=join_tokens(statement.tokens),
+                name=statement.target,
+                first=value[0],
+                second=value[2],
             )
             return
 
@@ -137,9 +155,14 @@ def hint_about_stale_twin(clues: Clues) -> Iterator[str]:
                 continue
             has_twin = any(each.tokens[-1] == reading[-1] and each.tokens[2:] != reading for each in renewed)
             if has_twin and _is_paired(listing, statement, renewed):
-                yield (
-                    f"{listing.locate(loop.line)}: the loop reads {renewed[0].target} again, but not {name}, which is "
-                    f"read once, in line {statement.line}. Repeat {join_tokens(statement.tokens)} in the loop"
+                yield Sentence(
+                    "%(place)s: the loop reads %(twin)s again, but not %(name)s, which is read once, in line "
+                    "%(line)s. Repeat %(code)s in the loop",
+                    place=listing.locate(loop.line),
+                    twin=renewed[0].target,
+                    name=name,
+                    line=statement.line,
+                    code=join_tokens(statement.tokens),
                 )
                 return
 
@@ -162,10 +185,13 @@ def hint_about_hasty_resending(clues: Clues) -> Iterator[str]:
             call = next((each for each in statement.calls if each.name.rpartition(".")[2] == "sleep"), None)
             seconds = listing.code.number(call.arguments[0]) if call is not None and call.arguments else None
             if seconds is not None and seconds < criterion.every[0] and listing.code.list_enclosing_loops(statement):
-                yield (
-                    f"{listing.locate(statement.line)} waits only {seconds:g} s, so the message is sent again before "
-                    f"its answer can come. Wait {criterion.every[0]:g} to {criterion.every[1]:g} s, for example with "
-                    "time.sleep(1)"
+                yield Sentence(
+                    "%(place)s waits only %(seconds)g s, so the message is sent again before its answer can "
+                    "come. Wait %(least)g to %(most)g s, for example with time.sleep(1)",
+                    place=listing.locate(statement.line),
+                    seconds=seconds,
+                    least=criterion.every[0],
+                    most=criterion.every[1],
                 )
                 return
 

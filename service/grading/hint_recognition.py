@@ -14,6 +14,8 @@ from service.grading.grade import Accuracy, CriterionResult
 from service.grading.hint_clues import Clues, find_finding
 from service.grading.hint_code import CallInCode, join_tokens
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
+from sim.sentences import Sentence
 
 _RIGHT = re.compile(r"""["']right["']|\bright(?:_\w*)?im(?:g|age)\w*|\bright_\w+""")
 _LEFT = re.compile(r"""["']left["']|\bleft(?:_\w*)?im(?:g|age)\w*|\bleft_\w+""")
@@ -24,7 +26,6 @@ _ARGMAX = re.compile(r"\bargmax\b|\.index\(")
 _NETWORK = re.compile(r"\bload(?:_onnx|_weights)?\(|\bMLPClassifier\(|\bcnn_load\(")
 _TURN = re.compile(r"\w\.T\b|\btranspose\(|\brot90\(|\bflip(?:lr|ud)?\(|\[::-1\]")
 _MAX_ACCURACY = 0.5
-_ASK = "Write names[int(network.predict(image)[0])] with your names for the list, the network and the image"
 _IMAGE = re.compile(r"IMG_DATA|[\"'](?:left|right)[\"']")
 #: A name from a list by a fixed number.
 _FIXED_NAME = re.compile(r"\b[^\W\d]\w*\[-?\d+\]\s*$")
@@ -61,9 +62,10 @@ def hint_about_pixel_step(clues: Clues) -> Iterator[str]:
         for statement in listing.code.statements if is_about_images else ():
             tokens = statement.tokens
             if any(tokens[at : at + 4] == (":", ":", "3", "]") for at in range(len(tokens) - 3)):
-                yield (
-                    f"{listing.locate(statement.line)} takes every third number, but each pixel has four: red, green, "
-                    "blue and alpha. Write 4 as the step, as in [::4]"
+                yield Sentence(
+                    "%(place)s takes every third number, but each pixel has four: red, green, blue and alpha. "
+                    "Write 4 as the step, as in [::4]",
+                    place=listing.locate(statement.line),
                 )
                 return
 
@@ -73,9 +75,10 @@ def _hint_about_other_sensor(clues: Clues) -> str:
     for listing in clues.responders:
         line = listing.find_line(_RIGHT)
         if line is not None and not any(each.find_line(_LEFT) for each in clues.responders):
-            return (
-                f"{listing.locate(line)} uses the right sensor's image, but the picture lies under the left sensor. "
-                f"Write left instead of right"
+            return Sentence(
+                "%(place)s uses the right sensor's image, but the picture lies under the left sensor. Write "
+                "left instead of right",
+                place=listing.locate(line),
             )
     return ""
 
@@ -85,9 +88,9 @@ def _hint_about_turned_image(clues: Clues) -> str:
     for listing in clues.responders:
         line = listing.find_line(_TURN)
         if line is not None:
-            return (
-                f"{listing.locate(line)} turns or mirrors the image, and the network knows upright images. Leave it as "
-                "it is"
+            return Sentence(
+                "%(place)s turns or mirrors the image, and the network knows upright images. Leave it as it is",
+                place=listing.locate(line),
             )
     return ""
 
@@ -103,20 +106,30 @@ def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
     location = _describe_labels_line(wrong_truths, clues)
     if len(swapped_pairs) == len(wrong_truths) == 2:
         first_name, second_name = swapped_pairs[0]
-        order = "Put the names into the order of the network" if _has_prediction(clues) else "Exchange the two names"
-        return f"{location}: {quote_text(first_name)} and {quote_text(second_name)} are swapped. {order}"
-    if len(wrong_truths) == len(answers) > 2:
-        return (
-            f"{location}: every image gets another's name, so the names are shifted by one place or in another order: "
-            f"{quote_text(wrong_truths[0])} is called {quote_text(answers[wrong_truths[0]])}. Put the names into the "
-            "order of the network, and count from 0"
+        template = (
+            translatable("%(place)s: %(first)s and %(second)s are swapped. Put the names into the order of the network")
+            if _has_prediction(clues)
+            else translatable("%(place)s: %(first)s and %(second)s are swapped. Exchange the two names")
         )
-    if len(wrong_truths) > 2:
-        return (
-            f"{location}: the names are in another order: {quote_text(wrong_truths[0])} is called "
-            f"{quote_text(answers[wrong_truths[0]])}. Put the names into the order of the network"
+        return Sentence(template, place=location, first=quote_text(first_name), second=quote_text(second_name))
+    if len(wrong_truths) < 3:
+        return ""
+    truth, answer = quote_text(wrong_truths[0]), quote_text(answers[wrong_truths[0]])
+    if len(wrong_truths) == len(answers):
+        return Sentence(
+            "%(place)s: every image gets another's name, so the names are shifted by one place or in another "
+            "order: %(truth)s is called %(answer)s. Put the names into the order of the network, and count from 0",
+            place=location,
+            truth=truth,
+            answer=answer,
         )
-    return ""
+    return Sentence(
+        "%(place)s: the names are in another order: %(truth)s is called %(answer)s. Put the names into the order of "
+        "the network",
+        place=location,
+        truth=truth,
+        answer=answer,
+    )
 
 
 def _describe_labels_line(names: Sequence[str], clues: Clues) -> str:
@@ -156,22 +169,31 @@ def _hint_about_frequent_answer(accuracy: Accuracy, clues: Clues) -> str:
                 head = next(
                     (one for one in listing.code.list_enclosing(statement) if one.keyword in ("if", "elif")), None
                 )
-                checked_part = (
-                    f"the condition in line {head.line}, {join_tokens(head.condition)}"
-                    if head
-                    else "the rules above it"
-                )
-                return (
-                    f"{listing.locate(statement.line)}: most images are called {quote_text(name)}. Check "
-                    f"{checked_part}, and the pixels that it gets: black is near 0, white near 255"
+                place, quoted_name = listing.locate(statement.line), quote_text(name)
+                if head is None:
+                    return Sentence(
+                        "%(place)s: most images are called %(name)s. Check the rules above it, and the pixels that it "
+                        "gets: black is near 0, white near 255",
+                        place=place,
+                        name=quoted_name,
+                    )
+                return Sentence(
+                    "%(place)s: most images are called %(name)s. Check the condition in line %(line)s, %(condition)s, "
+                    "and the pixels that it gets: black is near 0, white near 255",
+                    place=place,
+                    name=quoted_name,
+                    line=head.line,
+                    condition=join_tokens(head.condition),
                 )
         fit_statement = next(
             (each for each in listing.code.statements if any(_is_fit_call(call) for call in each.calls)), None
         )
         if fit_statement is not None:
-            return (
-                f"{listing.locate(fit_statement.line)} trains a classifier that names most images wrongly, often as "
-                f"{quote_text(name)}. Train longer (max_iter=300), and give each image the label that belongs to it"
+            return Sentence(
+                "%(place)s trains a classifier that names most images wrongly, often as %(name)s. Train longer "
+                "(max_iter=300), and give each image the label that belongs to it",
+                place=listing.locate(fit_statement.line),
+                name=quote_text(name),
             )
     return ""
 
@@ -188,19 +210,34 @@ def _hint_about_constant_answer(answers: Mapping[str, str], accuracy: Accuracy, 
     if not _has_prediction(clues):
         has_network = any(listing.find_line(_NETWORK) for listing in clues.responders)
         line = _describe_fixed_line(answer, clues) if has_network else ""
-        return line and f"{line}: every image is called {quote_text(answer)}, because no line asks the network. {_ASK}"
+        return line and Sentence(
+            "%(place)s: every image is called %(name)s, because no line asks the network. Write "
+            "names[int(network.predict(image)[0])] with your names for the list, the network and the image",
+            place=line,
+            name=quote_text(answer),
+        )
     for listing in clues.responders:
         chance_line = listing.find_line(_CHANCE_AS_PLACE)
         if chance_line is not None and not any(each.find_line(_ARGMAX) for each in clues.responders):
-            fix = "max() is the largest chance, and not its place. Write argmax() in place of max()"
-            return f"{listing.locate(chance_line)}: every image is called {quote_text(answer)}. {fix}"
+            return Sentence(
+                "%(place)s: every image is called %(name)s. max() is the largest chance, and not its place. Write "
+                "argmax() in place of max()",
+                place=listing.locate(chance_line),
+                name=quote_text(answer),
+            )
     is_normalised = any(each.find_line(_DIVISION) for each in clues.responders)
-    fix = (
-        "Print what you give to predict: it must be different for different images"
+    template = (
+        translatable(
+            "%(place)s: every image is called %(name)s, whatever it shows. Print what you give to predict: it must be "
+            "different for different images"
+        )
         if is_normalised
-        else "The network is for numbers from 0 to 1: divide the image by its largest value"
+        else translatable(
+            "%(place)s: every image is called %(name)s, whatever it shows. The network is for numbers from 0 to 1: "
+            "divide the image by its largest value"
+        )
     )
-    return f"{_describe_prediction_line(clues)}: every image is called {quote_text(answer)}, whatever it shows. {fix}"
+    return Sentence(template, place=_describe_prediction_line(clues), name=quote_text(answer))
 
 
 def _describe_fixed_line(name: str, clues: Clues) -> str:
@@ -219,5 +256,9 @@ def _hint_about_unknown_label(result: CriterionResult, accuracy: Accuracy, clues
     if unnamed is None or not accuracy.labels:
         return ""
     names = ", ".join(quote_text(label) for label in accuracy.labels[:3])
-    answer = quote_text(unnamed.answer)
-    return f"{_describe_prediction_line(clues)}: the answer is {answer}; expected one of the names, as {names}"
+    return Sentence(
+        "%(place)s: the answer is %(answer)s; expected one of the names, as %(names)s",
+        place=_describe_prediction_line(clues),
+        answer=quote_text(unnamed.answer),
+        names=names,
+    )

@@ -15,7 +15,9 @@ from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
 from sim.recording import Verdict
+from sim.sentences import Sentence
 from submissions.criteria.logs import Datalog
 from submissions.criteria.motion import Encounters
 from submissions.criteria.sequence import WordSequence
@@ -40,10 +42,19 @@ def hint_about_repeated_words(clues: Clues) -> Iterator[str]:
             lines = clues.recordings[0].spoken if call.name == "say" else clues.recordings[0].printed
             count = sum(line.text == text for line in lines)
             if is_single and count > 1 and len(call.arguments[0]) == 1:
-                yield (
-                    f"{listing.locate(statement.line)} {call.name}s {quote_text(text)} {count} times, in each pass of "
-                    f"the loop in line {loop.line}; expected once. To run it after the loop, remove its indentation"
+                template = (
+                    translatable(
+                        "%(place)s says %(text)s %(count)s times, in each pass of the loop in line %(line)s; expected "
+                        "once. To run it after the loop, remove its indentation"
+                    )
+                    if call.name == "say"
+                    else translatable(
+                        "%(place)s prints %(text)s %(count)s times, in each pass of the loop in line %(line)s; "
+                        "expected once. To run it after the loop, remove its indentation"
+                    )
                 )
+                place = listing.locate(statement.line)
+                yield Sentence(template, place=place, text=quote_text(text), count=count, line=loop.line)
                 return
 
 
@@ -62,10 +73,13 @@ def hint_about_inner_loop(clues: Clues) -> Iterator[str]:
         if has_output and not any(
             one.has_token(*outer_loop.bound_names - statement.bound_names) for one in (statement, *body)
         ):
-            yield (
-                f"{listing.locate(statement.line)}: this loop is inside the loop in line {outer_loop.line}, so it "
-                f"repeats its words in each pass of that loop. Words that are expected once appeared "
-                f"{repeated_words.count} more times. To run this loop once, after the other loop, indent it less"
+            yield Sentence(
+                "%(place)s: this loop is inside the loop in line %(line)s, so it repeats its words in each pass "
+                "of that loop. Words that are expected once appeared %(count)s more times. To run this loop "
+                "once, after the other loop, indent it less",
+                place=listing.locate(statement.line),
+                line=outer_loop.line,
+                count=repeated_words.count,
             )
             return
 
@@ -87,9 +101,14 @@ def hint_about_early_output(clues: Clues) -> Iterator[str]:
                 continue
             name = step.tokens[0]
             if statement.has_token(name) and step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1")):
-                yield (
-                    f"{listing.locate(statement.line)} writes {name} before line {step.line} adds 1 to it, and begins "
-                    f"with {first_number}. Exchange the two lines, or begin with {first_number + 1}"
+                yield Sentence(
+                    "%(place)s writes %(name)s before line %(line)s adds 1 to it, and begins with "
+                    "%(actual)s. Exchange the two lines, or begin with %(right)s",
+                    place=listing.locate(statement.line),
+                    name=name,
+                    line=step.line,
+                    actual=first_number,
+                    right=first_number + 1,
                 )
                 return
 
@@ -108,10 +127,11 @@ def hint_about_last_number(clues: Clues) -> Iterator[str]:
                 and condition[1] in _INCLUSIVE
                 and listing.code.number(condition[2:]) == missing_number
             ):
-                fixed_condition = f"{condition[0]} {_INCLUSIVE[condition[1]]} {condition[2]}"
-                yield (
-                    f"{listing.locate(statement.line)}: the loop ends before {missing_number}. Write while "
-                    f"{fixed_condition}"
+                yield Sentence(
+                    "%(place)s: the loop ends before %(number)s. Write while %(condition)s",
+                    place=listing.locate(statement.line),
+                    number=missing_number,
+                    condition=f"{condition[0]} {_INCLUSIVE[condition[1]]} {condition[2]}",
                 )
                 return
             call = (
@@ -131,9 +151,12 @@ def hint_about_last_number(clues: Clues) -> Iterator[str]:
                 (str(missing_number + (1 if missing_number > last_number else -1)),),
                 *call.arguments[2:],
             )
-            yield (
-                f"{listing.locate(statement.line)}: range({format_arguments(call.arguments)}) ends before "
-                f"{missing_number}. Write range({format_arguments(fixed_arguments)})"
+            yield Sentence(
+                "%(place)s: range(%(arguments)s) ends before %(number)s. Write range(%(fixed)s)",
+                place=listing.locate(statement.line),
+                arguments=format_arguments(call.arguments),
+                number=missing_number,
+                fixed=format_arguments(fixed_arguments),
             )
             return
 
@@ -161,10 +184,13 @@ def hint_about_exact_reading(clues: Clues) -> Iterator[str]:
             and has_reading
             and listing.code.number(condition[condition.index("==") + 1 :]) is not None
         ):
-            yield (
-                f"{listing.locate(statement.line)}: the loop continues only while {join_tokens(condition)} is true, so "
-                f"it ends at the first other reading: the program ended after {clues.seconds:.1f} s. Write a condition "
-                "that is true until the last required reading"
+            yield Sentence(
+                "%(place)s: the loop continues only while %(condition)s is true, so it ends at the first other "
+                "reading: the program ended after %(seconds).1f s. Write a condition that is true until the "
+                "last required reading",
+                place=listing.locate(statement.line),
+                condition=join_tokens(condition),
+                seconds=clues.seconds,
             )
             return
 
@@ -188,10 +214,14 @@ def hint_about_single_reaction(clues: Clues) -> Iterator[str]:
             if one.parent < 0 and has_motor_call(one, LIMITED_MOVES)
         ]
         if reactions:
-            yield (
-                f"{listing.locate(_find_first_move(listing.code.statements, statement).line)}: the program does "
-                f"everything once, and ends after {clues.seconds:.1f} s of {clues.limit:g} s. To repeat it, write "
-                f"while True: above this line, and indent the lines from here to line {reactions[-1].last_line}"
+            yield Sentence(
+                "%(place)s: the program does everything once, and ends after %(seconds).1f s of %(limit)g s. To "
+                "repeat it, write while True: above this line, and indent the lines from here to line "
+                "%(line)s",
+                place=listing.locate(_find_first_move(listing.code.statements, statement).line),
+                seconds=clues.seconds,
+                limit=clues.limit,
+                line=reactions[-1].last_line,
             )
             return
 

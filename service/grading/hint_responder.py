@@ -11,11 +11,13 @@ from collections.abc import Iterator
 
 from responders.message_format import JSON
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
-from service.grading.hint_clues import Clues, find_listing
+from service.grading.hint_clues import Clues, Listing, find_listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_files import hint_about_redefined_functions
 from service.grading.hint_formats import describe_return_line, hint_about_answers
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
+from sim.sentences import Sentence
 from submissions.raw_files import sanitise_name
 
 _DOUBLE_JSON = re.compile(r'JSON::\s*"')
@@ -35,9 +37,11 @@ def hint_about_misnamed_function(clues: Clues) -> Iterator[str]:
     functions = [(one, each) for one in clues.responders for each in one.code.list_functions() if not each.indent]
     similar_names = difflib.get_close_matches(required_name, [each.tokens[1] for _, each in functions], 1, 0.5)
     for listing, head in [pair for pair in functions if pair[1].tokens[1] in similar_names][:1]:
-        yield (
-            f"{listing.locate(head.line)} defines {sanitise_name(head.tokens[1])}; expected a function called "
-            f"{required_name}"
+        yield Sentence(
+            "%(place)s defines %(name)s; expected a function called %(required)s",
+            place=listing.locate(head.line),
+            name=sanitise_name(head.tokens[1]),
+            required=required_name,
         )
 
 
@@ -46,17 +50,19 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
     if clues.missing == "responder" or not any(is_kind(fault, FaultKind.MISSING_RESPONDER) for fault in clues.faults):
         return
     if clues.idle_responder:
-        yield (
-            f"the cell that begins with {quote_text(clues.idle_responder)} is a Raw cell, which is not run. "
-            "Change its type to Code"
+        yield Sentence(
+            "the cell that begins with %(code)s is a Raw cell, which is not run. Change its type to Code",
+            code=quote_text(clues.idle_responder),
         )
         return
     for listing in clues.programs:
         for head in listing.code.list_functions():
             if _RESPONDER.match(head.tokens[1]) and listing.part is None:
-                yield (
-                    f"{listing.locate(head.line)} defines {head.tokens[1]} in the robot program, where nothing calls "
-                    f"it. Move it to a cell above, and add roboSim.pyresponder = {head.tokens[1]} below it"
+                yield Sentence(
+                    "%(place)s defines %(name)s in the robot program, where nothing calls it. Move it to a "
+                    "cell above, and add roboSim.pyresponder = %(name)s below it",
+                    place=listing.locate(head.line),
+                    name=head.tokens[1],
                 )
                 return
     functions = [
@@ -70,21 +76,34 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
         if is_cell and _RESPONDER.match(name):
             return
         if similar_functions:
-            yield f"{listing.locate(head.line)} defines {sanitise_name(name)}; expected a function called responder"
+            yield Sentence(
+                "%(place)s defines %(name)s; expected a function called %(required)s",
+                place=listing.locate(head.line),
+                name=sanitise_name(name),
+                required="responder",
+            )
         elif is_cell:
-            yield (
-                f"{listing.locate(head.line)} defines {sanitise_name(name)}, but nothing makes it the responder. "
-                f"Add the line roboSim.pyresponder = {name} below it"
+            yield Sentence(
+                "%(place)s defines %(name)s, but nothing makes it the responder. Add the line "
+                "roboSim.pyresponder = %(name)s below it",
+                place=listing.locate(head.line),
+                name=sanitise_name(name),
             )
         else:
-            yield (
-                f"{listing.locate(head.line)} defines {sanitise_name(name)}, but there is no function called "
-                "responder. Begin the function that answers the robot with def responder(text):"
+            yield Sentence(
+                "%(place)s defines %(name)s, but there is no function called responder. Begin the function that "
+                "answers the robot with def responder(text):",
+                place=listing.locate(head.line),
+                name=sanitise_name(name),
             )
         return
-    location = next((each.name for each in clues.responders if each.part is not None), "no cell")
-    clause = "defines no responder" if location != "no cell" else "defines a responder"
-    yield f'{location} {clause}. Add a function that begins with "def responder(text):"'
+    file = next((each.name for each in clues.responders if each.part is not None), "")
+    template = (
+        translatable('%(file)s defines no responder. Add a function that begins with "def responder(text):"')
+        if file
+        else translatable('no cell defines a responder. Add a function that begins with "def responder(text):"')
+    )
+    yield Sentence(template, file=file)
 
 
 def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
@@ -98,17 +117,21 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
             for statement in listing.code.statements:
                 is_function = is_bad_call and fault.line is None and statement.tokens[:2] == ("def", called_name)
                 if is_function and ":" in statement.tokens:
-                    count = _describe_parameters(statement)
-                    yield (
-                        f"{listing.locate(statement.line)}: {join_tokens(statement.tokens)[4:-1]} expects {count}, "
-                        f"but it is called with one text. Write def {statement.tokens[1]}(text):"
+                    yield Sentence(
+                        "%(place)s: %(code)s expects %(count)s, but it is called with one text. Write def "
+                        "%(name)s(text):",
+                        place=listing.locate(statement.line),
+                        code=join_tokens(statement.tokens)[4:-1],
+                        count=_describe_parameters(statement),
+                        name=statement.tokens[1],
                     )
                     return
                 if not is_bad_call and statement.tokens[:4] == ("roboSim", ".", "pyresponder", "="):
-                    name = statement.tokens[4]
-                    yield (
-                        f"{listing.locate(statement.line)} assigns a text to roboSim.pyresponder; expected a function. "
-                        f"Write it without brackets: roboSim.pyresponder = {name}"
+                    yield Sentence(
+                        "%(place)s assigns a text to roboSim.pyresponder; expected a function. Write it without "
+                        "brackets: roboSim.pyresponder = %(name)s",
+                        place=listing.locate(statement.line),
+                        name=statement.tokens[4],
                     )
                     return
 
@@ -122,9 +145,12 @@ def hint_about_called_responder(clues: Clues) -> Iterator[str]:
             continue
         call = next((each for each in statement.calls if each.name == statement.tokens[4]), None)
         if call is not None:
-            yield (
-                f"{listing.locate(statement.line)} calls {call.name}, which failed: {fault.message.rstrip('.')}. Write "
-                f"it without brackets: roboSim.pyresponder = {call.name}"
+            yield Sentence(
+                "%(place)s calls %(name)s, which failed: %(failure)s. Write it without brackets: "
+                "roboSim.pyresponder = %(name)s",
+                place=listing.locate(statement.line),
+                name=call.name,
+                failure=fault.message.rstrip("."),
             )
             return
 
@@ -142,20 +168,29 @@ def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:
             print_statements = [each for each in body if each.keyword == "print"]
             if print_statements and (not returns or print_statements[-1].line > returns[-1].line):
                 line = print_statements[-1].line
-                code_line = quote_text(listing.lines[line - 1])
-                yield (
-                    f"{listing.locate(line)}, {code_line}, prints the answer, but no line returns it. Return the "
-                    "answer with return"
+                yield Sentence(
+                    "%(place)s, %(code)s, prints the answer, but no line returns it. Return the answer with return",
+                    place=listing.locate(line),
+                    code=quote_text(listing.lines[line - 1]),
                 )
             elif not returns:
-                yield f"{listing.locate(head.line)}: {head.tokens[1]} has no return with an answer; expected one"
+                yield Sentence(
+                    "%(place)s: %(name)s has no return with an answer; expected one",
+                    place=listing.locate(head.line),
+                    name=head.tokens[1],
+                )
             elif any(each.tokens == ("return",) for each in body):
                 line = next(each.line for each in body if each.tokens == ("return",))
-                yield f"{listing.locate(line)}: return without a value answers nothing. Write the answer after return"
+                yield Sentence(
+                    "%(place)s: return without a value answers nothing. Write the answer after return",
+                    place=listing.locate(line),
+                )
             else:
-                yield (
-                    f"{listing.locate(head.line)}: {head.tokens[1]} can end without a return, and then answers "
-                    "nothing. Add a return with an answer as its last line"
+                yield Sentence(
+                    "%(place)s: %(name)s can end without a return, and then answers nothing. Add a return "
+                    "with an answer as its last line",
+                    place=listing.locate(head.line),
+                    name=head.tokens[1],
                 )
             return
 
@@ -178,8 +213,12 @@ def hint_about_unreadable_answers(clues: Clues) -> Iterator[str]:
             ]
             str_returns = [each for each in returns if each.has_token("str")]
             return_statement = (str_returns or undumped_returns or returns)[-1]
-            fix = "Write json.dumps(...) instead of str(...)" if str_returns else fault.hint
-            yield f"{listing.locate(return_statement.line)}: {fault.message.rstrip('.')}. {fix}"
+            yield Sentence(
+                "%(place)s: %(problem)s. %(advice)s",
+                place=listing.locate(return_statement.line),
+                problem=fault.message.rstrip("."),
+                advice=Sentence("Write json.dumps(...) instead of str(...)") if str_returns else fault.hint,
+            )
             return
 
 
@@ -195,9 +234,10 @@ def hint_about_double_json(clues: Clues) -> Iterator[str]:
             each for each in dump_statements if sum(_is_dump_function(call.name) for call in each.calls) > 1
         ]
         for statement in (*double_dumps, *dump_statements[-1:]):
-            yield (
-                f"{listing.locate(statement.line)}: the object is made JSON twice, so the robot gets a text and no "
-                "object. Call json.dumps once"
+            yield Sentence(
+                "%(place)s: the object is made JSON twice, so the robot gets a text and no object. Call "
+                "json.dumps once",
+                place=listing.locate(statement.line),
             )
             return
 
@@ -215,9 +255,11 @@ def hint_about_single_colon(clues: Clues) -> Iterator[str]:
                 method = call.name.rpartition(".")[2]
                 if method in ("partition", "split") and call.arguments and call.arguments[0] in _COLON:
                     split_call = 'partition("::")' if method == "partition" else 'split("::", 1)'
-                    yield (
-                        f'{listing.locate(statement.line)} cuts the message at ":", so the rest still begins with '
-                        f"a colon. The prefix ends in two colons: write {split_call}"
+                    yield Sentence(
+                        '%(place)s cuts the message at ":", so the rest still begins with a colon. The prefix '
+                        "ends in two colons: write %(code)s",
+                        place=listing.locate(statement.line),
+                        code=split_call,
                     )
                     return
 
@@ -235,18 +277,45 @@ def hint_about_unqueued_answers(clues: Clues) -> Iterator[str]:
     if any(True for _ in (*hint_about_answers(clues), *hint_about_wrong_prefix(clues))):
         return
     answer = quote_text(clues.answers[0])
-    redefinition_hint = next((each for each in hint_about_redefined_functions(clues) if "responder again" in each), "")
-    if redefinition_hint:
-        yield (
-            f"{redefinition_hint.partition('. ')[0]}. It answers {answer}, without {JSON}, so the queue stays empty. "
-            "Delete it"
+    redefinition = _describe_redefinition(clues)
+    if redefinition:
+        yield Sentence(
+            "%(problem)s. It answers %(answer)s, without JSON::, so the queue stays empty. Delete it",
+            problem=redefinition,
+            answer=answer,
         )
         return
     location = describe_return_line(clues.answers[0], clues, _RETURN)
-    yield (
-        f"{location} answers {answer}, without {JSON} at its start, so the queue stays empty. "
-        f'Write return "{JSON}" + json.dumps(...)'
+    yield Sentence(
+        '%(place)s answers %(answer)s, without JSON:: at its start, so the queue stays empty. Write return "JSON::" + '
+        "json.dumps(...)",
+        place=location,
+        answer=answer,
     )
+
+
+def _describe_redefinition(clues: Clues) -> str:
+    """Return where a responder replaces an earlier one; empty if none does."""
+    if not any("responder again" in each for each in hint_about_redefined_functions(clues)):
+        return ""
+    definitions: dict[str, tuple[Listing, Statement]] = {}
+    for listing in clues.responders:
+        for head in listing.code.list_functions():
+            name = head.tokens[1]
+            if head.indent or not name.endswith("responder"):
+                continue
+            if name in definitions:
+                earlier_listing, earlier_head = definitions[name]
+                is_near = earlier_listing is listing
+                earlier_line = Sentence("line %(line)s", line=earlier_head.line)
+                return Sentence(
+                    "%(place)s defines %(name)s again, instead of the function in %(other_place)s",
+                    place=listing.locate(head.line),
+                    name=name,
+                    other_place=earlier_line if is_near else earlier_listing.locate(earlier_head.line),
+                )
+            definitions[name] = listing, head
+    return ""
 
 
 def hint_about_wrong_prefix(clues: Clues) -> Iterator[str]:
@@ -254,8 +323,10 @@ def hint_about_wrong_prefix(clues: Clues) -> Iterator[str]:
     for text in clues.answers:
         if text.startswith("PY::") and clues.should_use_queue:
             location = clues.describe_matching_line("responder", re.compile(r"""["']PY::"""))
-            yield (
-                f'{location}: the answer is {quote_text(text)}, which begins with PY::; expected "{JSON}" at its start'
+            yield Sentence(
+                '%(place)s: the answer is %(text)s, which begins with PY::; expected "JSON::" at its start',
+                place=location,
+                text=quote_text(text),
             )
             return
 
@@ -266,7 +337,8 @@ def _is_dump_function(name: str) -> bool:
 
 def _describe_parameters(head: Statement) -> str:
     count = head.tokens.count(",") + (1 if head.tokens[2:5] != ("(", ")", ":") else 0)
-    return {0: "nothing", 2: "two values", 3: "three values"}.get(count, f"{count} values")
+    named_counts = {0: Sentence("nothing"), 2: Sentence("two values"), 3: Sentence("three values")}
+    return named_counts.get(count, Sentence("%(count)s values", count=count))
 
 
 def _measure_similarity(first_name: str, second_name: str) -> float:

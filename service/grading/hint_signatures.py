@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from service.grading.fault_kinds import FaultKind, read_values
 from service.grading.hint_clues import Clues, Listing, describe_fault_line
 from service.grading.hint_code import Statement, is_name
+from service.language import translatable
+from sim.sentences import Sentence
 
 
 def hint_about_signatures(clues: Clues) -> Iterator[str]:
@@ -22,25 +24,42 @@ def hint_about_signatures(clues: Clues) -> Iterator[str]:
         enclosing_class = next((each for each in listing.code.list_enclosing(head) if each.keyword == "class"), None)
         if enclosing_class is not None and "self" not in head.tokens:
             parameters = "".join(f", {each}" for each in _list_parameters(head))
-            yield (
-                f'{listing.locate(head.line)}: a method needs self as first parameter. Write "def '
-                f'{name}(self{parameters}):"'
+            yield Sentence(
+                '%(place)s: a method needs self as first parameter. Write "def %(name)s(self%(parameters)s):"',
+                place=listing.locate(head.line),
+                name=name,
+                parameters=parameters,
             )
             return
         arguments = _list_arguments(name, clues)
         if fault.agent and fault.line is None and arguments:
-            yield (
-                f"{listing.locate(head.line)} defines {name} with "
-                f"{_describe_parameter_count(len(_list_parameters(head)))}, but {_describe_call(name, clues)} calls it "
-                f'with {len(arguments)}. Write "def {name}({", ".join(arguments)}):", or change the call'
+            yield Sentence(
+                "%(place)s defines %(name)s with %(parameters)s, but %(caller)s calls it with %(count)s. "
+                'Write "def %(name)s(%(arguments)s):", or change the call',
+                place=listing.locate(head.line),
+                name=name,
+                parameters=_describe_parameter_count(len(_list_parameters(head))),
+                caller=_describe_call(name, clues),
+                count=len(arguments),
+                arguments=", ".join(arguments),
             )
             return
         location = describe_fault_line(fault, clues)
         if location and fault.line is not None and enclosing_class is None:
-            yield (
-                f"{location} calls {name} with another number of values than line {head.line} of {listing.name} "
-                f"defines. Its parameters are: {', '.join(_list_parameters(head)) or 'none'}"
+            parameters = ", ".join(_list_parameters(head))
+            template = (
+                translatable(
+                    "%(place)s calls %(name)s with another number of values than %(definition)s defines. Its "
+                    "parameters are: %(parameters)s"
+                )
+                if parameters
+                else translatable(
+                    "%(place)s calls %(name)s with another number of values than %(definition)s defines. Its "
+                    "parameters are: none"
+                )
             )
+            definition = listing.locate(head.line)
+            yield Sentence(template, place=location, name=name, definition=definition, parameters=parameters)
             return
 
 
@@ -79,8 +98,9 @@ def _describe_call(name: str, clues: Clues) -> str:
         for statement in listing.code.statements
         if any(call.name == name for call in statement.calls)
     )
-    return next(calls, "another part")
+    return next(calls, Sentence("another part"))
 
 
 def _describe_parameter_count(number: int) -> str:
-    return {0: "no parameter", 1: "one parameter"}.get(number, f"{number} parameters")
+    named_counts = {0: Sentence("no parameter"), 1: Sentence("one parameter")}
+    return named_counts.get(number, Sentence("%(number)s parameters", number=number))

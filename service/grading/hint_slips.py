@@ -26,6 +26,8 @@ from service.grading.hint_variables import (
     check_removal_in_loop,
     check_unreachable_if,
 )
+from service.language import translatable
+from sim.sentences import Sentence
 
 COMPARISONS = frozenset({"<", ">", "<=", ">=", "==", "!="})
 _ORDER_SIGNS = frozenset({"<", ">", "<=", ">="})
@@ -78,7 +80,9 @@ def _check_caret(listing: Listing, statement: Statement) -> str:
             and _NUMBER.match(following)
             and (is_name(previous) or previous == ")" or _NUMBER.match(previous))
         ):
-            return f"{listing.locate(statement.line)}: ^ is not a power in Python. Write ** instead of ^"
+            return Sentence(
+                "%(place)s: ^ is not a power in Python. Write ** instead of ^", place=listing.locate(statement.line)
+            )
     return ""
 
 
@@ -91,9 +95,13 @@ def _check_bitwise_operator(listing: Listing, statement: Statement) -> str:
         left, right = _split_operands(tokens, levels, index)
         comparisons = [each for each in (*left, *right) if each in COMPARISONS]
         if len(comparisons) > 1:
-            return (
-                f"{listing.locate(statement.line)}: {token} is calculated before {comparisons[0]}, so this does not "
-                f"ask for both comparisons. Write {keywords[token]} instead of {token}"
+            return Sentence(
+                "%(place)s: %(sign)s is calculated before %(comparison)s, so this does not ask for both "
+                "comparisons. Write %(right)s instead of %(sign)s",
+                place=listing.locate(statement.line),
+                sign=token,
+                comparison=comparisons[0],
+                right=keywords[token],
             )
     return ""
 
@@ -110,10 +118,13 @@ def _check_constant_operand(listing: Listing, statement: Statement) -> str:
         left_operand = tokens[start:index]
         sign_index = next((at for at, each in enumerate(left_operand) if each in COMPARISONS), None)
         if sign_index:
-            comparison = join_tokens((*left_operand[: sign_index + 1], value))
-            return (
-                f"{listing.locate(statement.line)}: {value} after {token} is not compared, and is always true. "
-                f"Write {token} {comparison}"
+            return Sentence(
+                "%(place)s: %(value)s after %(word)s is not compared, and is always true. Write %(word)s "
+                "%(comparison)s",
+                place=listing.locate(statement.line),
+                value=value,
+                word=token,
+                comparison=join_tokens((*left_operand[: sign_index + 1], value)),
             )
     return ""
 
@@ -136,11 +147,13 @@ def _check_bare_operand(listing: Listing, statement: Statement) -> str:
             and first_name != second_name
             and _is_numeric_name(listing.code, first_name)
         ):
-            number = tokens[index + 4]
-            return (
-                f"{listing.locate(statement.line)}: {first_name} {connective} {second_name} {sign} {number} only asks "
-                f"whether {first_name} is not 0. Write {first_name} {sign} {number} {connective} {second_name} {sign} "
-                f"{number}"
+            comparison = f"{sign} {tokens[index + 4]}"
+            return Sentence(
+                "%(place)s: %(code)s only asks whether %(name)s is not 0. Write %(right)s",
+                place=listing.locate(statement.line),
+                code=f"{first_name} {connective} {second_name} {comparison}",
+                name=first_name,
+                right=f"{first_name} {comparison} {connective} {second_name} {comparison}",
             )
     return ""
 
@@ -173,9 +186,11 @@ def _check_missing_comma(listing: Listing, statement: Statement) -> str:
         inner_indices = [at for at in range(opening_index + 1, len(tokens)) if levels[at] == levels[index]]
         if tokens[opening_index] in "[{" and any(tokens[at] == "," for at in inner_indices):
             line = _find_line(listing, statement, first_text, second_text)
-            return (
-                f"{listing.locate(line)}: a comma is missing after {first_text}, so Python joins it to {second_text}. "
-                "Add the comma"
+            return Sentence(
+                "%(place)s: a comma is missing after %(first)s, so Python joins it to %(second)s. Add the comma",
+                place=listing.locate(line),
+                first=first_text,
+                second=second_text,
             )
     return ""
 
@@ -197,9 +212,13 @@ def _check_uncalled_function(listing: Listing, statement: Statement) -> str:
             start = index - 2 if index > 1 and tokens[index - 1] == "." else index
             name = join_tokens(tokens[start : index + 1])
             comparison = join_tokens(tokens[start : index + 3])
-            return (
-                f"{listing.locate(statement.line)}: {token} is a function. Without brackets it is not called, so "
-                f"{comparison} does not compare its result. Write {name}()"
+            return Sentence(
+                "%(place)s: %(function)s is a function. Without brackets it is not called, so %(comparison)s does "
+                "not compare its result. Write %(name)s()",
+                place=listing.locate(statement.line),
+                function=token,
+                comparison=comparison,
+                name=name,
             )
     return ""
 
@@ -212,8 +231,16 @@ def _check_reading_as_text(listing: Listing, statement: Statement) -> str:
         reading = find_reading(tokens[index - 1 : index], listing.code)
         if sign not in ("==", "!=") or not _TEXT.match(text) or reading not in READINGS:
             continue
-        fix = "Write color_name instead of color" if reading == "color" else f"Write {text[1:-1]} without quotes"
-        return f"{listing.locate(statement.line)}: {reading} is a number, and never equals the text {text}. {fix}"
+        template = (
+            translatable(
+                "%(place)s: %(name)s is a number, and never equals the text %(text)s. Write color_name instead of color"
+            )
+            if reading == "color"
+            else translatable(
+                "%(place)s: %(name)s is a number, and never equals the text %(text)s. Write %(number)s without quotes"
+            )
+        )
+        return Sentence(template, place=listing.locate(statement.line), name=reading, text=text, number=text[1:-1])
     return ""
 
 
@@ -225,14 +252,22 @@ def _check_empty_range(listing: Listing, statement: Statement) -> str:
     start, end, step = (*numbers, 1.0)[:3]
     if start is None or end is None or not step or (end - start) * step > 0:
         return ""
-    range_call = f"range({format_arguments(call.arguments)})"
     if step > 0 and start > end:
-        fix = f"To count down to {end:g}, write range({start:g}, {end - 1:g}, -1)"
+        fix = Sentence(
+            "To count down to %(end)g, write range(%(start)g, %(limit)g, -1)", end=end, start=start, limit=end - 1
+        )
     elif step < 0 and start < end:
-        fix = f"To count up to {end:g}, write range({start:g}, {end + 1:g})"
+        fix = Sentence("To count up to %(end)g, write range(%(start)g, %(limit)g)", end=end, start=start, limit=end + 1)
+    elif step > 0:
+        fix = Sentence("The end is never reached: write a larger end")
     else:
-        fix = "The end is never reached: write a larger end" if step > 0 else "Write a smaller end"
-    return f"{listing.locate(statement.line)}: {range_call} is empty, so the loop never runs. {fix}"
+        fix = Sentence("Write a smaller end")
+    return Sentence(
+        "%(place)s: range(%(arguments)s) is empty, so the loop never runs. %(advice)s",
+        place=listing.locate(statement.line),
+        arguments=format_arguments(call.arguments),
+        advice=fix,
+    )
 
 
 def format_arguments(arguments: Sequence[Sequence[str]]) -> str:
@@ -252,7 +287,11 @@ def _check_unused_value(listing: Listing, statement: Statement) -> str:
     is_text = token[:1] in "fF" and _TEXT.match(token) is not None
     if not (is_value or is_text):
         return ""
-    return f"{listing.locate(statement.line)}: {token} alone does nothing, and is not returned. Write return {token}"
+    return Sentence(
+        "%(place)s: %(code)s alone does nothing, and is not returned. Write return %(code)s",
+        place=listing.locate(statement.line),
+        code=token,
+    )
 
 
 def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
@@ -278,9 +317,11 @@ def _check_chained_ifs(listing: Listing, statement: Statement) -> str:
         return ""
     if (first_limit > second_limit) != (statement.condition[1] in (">", ">=")):
         return ""
-    return (
-        f"{listing.locate(next_statement.line)}: this if is also checked when the if in line {statement.line} was "
-        "true, so both run. Write elif instead of if"
+    return Sentence(
+        "%(place)s: this if is also checked when the if in line %(line)s was true, so both run. Write elif "
+        "instead of if",
+        place=listing.locate(next_statement.line),
+        line=statement.line,
     )
 
 

@@ -17,6 +17,7 @@ from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name
 from service.grading.hint_tables import ACTIONS
 from sim.recording import Fault
+from sim.sentences import Sentence
 
 _ELSE_IF = re.compile(r"\s*(else\s+if|else?if|elsif|elf)\b")
 _EMPTY_CONDITION = re.compile(r"\s*(elif|if|while)\s*:")
@@ -67,11 +68,16 @@ def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statem
 def _advise_on_copied_signs(line: str) -> str:
     """Return advice on signs that were copied with the program: Markdown fences, and line numbers."""
     if line.lstrip().startswith("```"):
-        return "``` marks code in a chat or a document, and is no Python. Delete each line that begins with ```."
+        return Sentence(
+            "``` marks code in a chat or a document, and is no Python. Delete each line that begins with ```."
+        )
     match = _LINE_NUMBER.match(line)
     if match is None:
         return ""
-    return f"{match[1]} at the start is a line number, and no Python. Delete the numbers at the start of the lines."
+    return Sentence(
+        "%(number)s at the start is a line number, and no Python. Delete the numbers at the start of the lines.",
+        number=match[1],
+    )
 
 
 def _advise_on_call_without_brackets(line: str) -> str:
@@ -82,18 +88,24 @@ def _advise_on_call_without_brackets(line: str) -> str:
     first_word = re.match(r"\w*", values)
     if first_word is not None and keyword.iskeyword(first_word[0]):
         return ""
-    return f"A call needs brackets: write {match['name']}({values})."
+    return Sentence("A call needs brackets: write %(name)s(%(values)s).", name=match["name"], values=values)
 
 
 def _advise_on_comparison_sign(line: str) -> str:
     match = _SIGN.search(_TEXTS.sub('""', line))
-    return f"Python has no sign {match[0]}. Write {_SIGNS[match[0]]}." if match is not None else ""
+    if match is None:
+        return ""
+    return Sentence("Python has no sign %(wrong)s. Write %(right)s.", wrong=match[0], right=_SIGNS[match[0]])
 
 
 def _advise_on_unit(line: str) -> str:
     """Return advice on ``50%`` or ``2 s``, where only a number can stand."""
     match = _NUMBER_WITH_UNIT.search(_TEXTS.sub('""', line))
-    return f"A number has no unit in Python: write {match[1]} in place of {match[0].strip()}." if match else ""
+    if match is None:
+        return ""
+    return Sentence(
+        "A number has no unit in Python: write %(number)s in place of %(text)s.", number=match[1], text=match[0].strip()
+    )
 
 
 def _advise_on_unquoted_prefix(line: str) -> str:
@@ -101,7 +113,7 @@ def _advise_on_unquoted_prefix(line: str) -> str:
     if match is None or _UNQUOTED_PREFIX.search(_TEXTS.sub('""', line)) is None:
         return ""
     fixed_line = f'{line[: match.start()]}"{match[0]}"{line[match.end() :]}'
-    return f"{match[0]} is a text and needs quotes: write {fixed_line.strip()}."
+    return Sentence("%(text)s is a text and needs quotes: write %(code)s.", text=match[0], code=fixed_line.strip())
 
 
 def _advise_on_missing_plus(line: str) -> str:
@@ -111,7 +123,11 @@ def _advise_on_missing_plus(line: str) -> str:
         is_after_text = first_type == tokenize.STRING and second_type in (tokenize.NAME, tokenize.NUMBER)
         is_before_text = second_type == tokenize.STRING and (is_name(first) or first in (")", "]"))
         if (is_after_text or is_before_text) and not {first, second} & set(keyword.kwlist):
-            return f"There is no sign between {first} and {second}. To join texts, write + between them."
+            return Sentence(
+                "There is no sign between %(first)s and %(second)s. To join texts, write + between them.",
+                first=first,
+                second=second,
+            )
     return ""
 
 
@@ -128,21 +144,25 @@ def _advise_on_else_if(line: str) -> str:
     match = _ELSE_IF.match(line)
     if match is None:
         return ""
-    keyword = " ".join(match[1].split())
-    return f"Python has no {keyword}. Write elif instead of {keyword}."
+    return Sentence("Python has no %(wrong)s. Write elif instead of %(wrong)s.", wrong=" ".join(match[1].split()))
 
 
 def _advise_on_branch(line: str) -> str:
     """Return advice on ``elif:`` without a condition, ``else`` with one, and a second statement in a line."""
     empty_match = _EMPTY_CONDITION.match(line)
     if empty_match is not None:
-        fix = " For all other cases write else:" if empty_match[1] == "elif" else ""
-        return f"{empty_match[1]} needs a condition before the colon.{fix}"
+        if empty_match[1] == "elif":
+            return Sentence("elif needs a condition before the colon. For all other cases write else:")
+        return Sentence("%(keyword)s needs a condition before the colon.", keyword=empty_match[1])
     else_match = _ELSE_CONDITION.match(line)
     if else_match is not None:
-        return f"else has no condition: write else: alone, or elif {else_match[1].strip()}:"
+        return Sentence(
+            "else has no condition: write else: alone, or elif %(condition)s:", condition=else_match[1].strip()
+        )
     second_match = _SECOND_STATEMENT.match(_TEXTS.sub('""', line))
-    return f"A new statement begins at {second_match[1]}: write it in a line of its own." if second_match else ""
+    if second_match is None:
+        return ""
+    return Sentence("A new statement begins at %(code)s: write it in a line of its own.", code=second_match[1])
 
 
 def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
@@ -153,8 +173,17 @@ def _advise_on_indentation(fault: Fault, listing: Listing, line: str) -> str:
     head = int(values[0])
     width = _count_indent("".join(listing.lines[head - 1 : head])) + _INDENT_WIDTH
     if not line.strip() or fault.line == head:
-        return f"Write the lines that belong to line {head} below it. Begin each with {width} blanks."
-    return f"If line {fault.line} belongs to line {head}, indent it: begin line {fault.line} with {width} blanks."
+        return Sentence(
+            "Write the lines that belong to line %(head)s below it. Begin each with %(width)s blanks.",
+            head=head,
+            width=width,
+        )
+    return Sentence(
+        "If line %(line)s belongs to line %(head)s, indent it: begin line %(line)s with %(width)s blanks.",
+        line=fault.line,
+        head=head,
+        width=width,
+    )
 
 
 def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
@@ -163,19 +192,20 @@ def _advise_on_unclosed_text(fault: Fault, line: str) -> str:
     if values is None:
         return ""
     if values[0]:
-        return "A text that begins with three quotes must end with three quotes."
+        return Sentence("A text that begins with three quotes must end with three quotes.")
     opening = _find_open_quote(line)
     if opening is None:
         return ""
     quote, text = line[opening], line[opening + 1 :]
     if quote == "'" and re.search(r"\w'\w", line):
-        return "The ' in the text ends it. Put \" around the text."
+        return Sentence("The ' in the text ends it. Put \" around the text.")
     line_start = line[:opening]
     text_content, end = _split_end(text.rstrip(), line_start.count("(") - line_start.count(")"))
     other_quote = "'" if quote == '"' else '"'
-    return (
-        f"The text has no closing {quote}. Write "
-        f"{line_start.strip()}{quote}{text_content.removesuffix(other_quote)}{quote}{end}"
+    return Sentence(
+        "The text has no closing %(quote)s. Write %(code)s",
+        quote=quote,
+        code=f"{line_start.strip()}{quote}{text_content.removesuffix(other_quote)}{quote}{end}",
     )
 
 
@@ -216,7 +246,8 @@ def _advise_on_unquoted_words(line: str, listing: Listing) -> str:
     bound_names = {name for each in listing.code.statements for name in each.bound_names}
     if set(match[2].split()) <= bound_names:
         return ""
-    return f'A text needs quotes: write {match[1]}("{match[2]}"{line[match.end() :].strip()}'
+    code = f'{match[1]}("{match[2]}"{line[match.end() :].strip()}'
+    return Sentence("A text needs quotes: write %(code)s", code=code)
 
 
 def _count_indent(line: str) -> int:

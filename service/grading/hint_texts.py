@@ -14,7 +14,9 @@ from responders.message_format import classify_text
 from service.grading.hint_clues import Clues
 from service.grading.hint_differences import advise_on_difference
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
 from sim.recording import Verdict
+from sim.sentences import Sentence
 from submissions.criteria import Criterion
 from submissions.criteria.logs import Datalog
 from submissions.criteria.replies import Replies
@@ -47,6 +49,15 @@ class ExpectedText:
         starts = range(1 if self.how == "starts_with" else max(len(words) - count + 1, 1))
         yield from (" ".join(words[place : place + count]) for place in starts)
 
+    def describe(self) -> str:
+        """Return the quoted text, and where it is expected."""
+        quoted_text = quote_text(self.text)
+        if self.how == "equals":
+            return quoted_text
+        template = translatable("%(text)s in it")
+        template = translatable("%(text)s at its start") if self.how == "starts_with" else template
+        return Sentence(template, text=quoted_text)
+
     def is_met_by(self, text: str, *, ignore_case: bool) -> bool:
         """Return whether the text matches, by the criterion's rules."""
         actual, expected = (" ".join(each.split()) for each in (text, self.text))
@@ -73,7 +84,7 @@ def hint_about_texts(clues: Clues) -> Iterator[str]:
 
 def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterator[str]:
     for criterion in criteria:
-        part, texts, verb = _find_checked_texts(criterion, clues)
+        part, texts, template = _find_checked_texts(criterion, clues)
         expected_texts = list(_collect_expected_texts(criterion))
         should_ignore_case = getattr(criterion, "ignore_case", False)
         unexpected_texts = [
@@ -86,13 +97,15 @@ def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterato
                 continue
             similar_text = next((text for text in unexpected_texts[:_MAX_TEXTS] if is_near(expected_text, text)), None)
             if similar_text is not None:
-                position = {"equals": "", "starts_with": " at its start"}.get(expected_text.how, " in it")
                 is_whole = expected_text.how == "equals"
                 advice = advise_on_difference(expected_text.text, similar_text) if is_whole else ""
-                yield (
-                    f"{describe_quoting_line(clues, part, similar_text)} {verb} {quote_text(similar_text)}; expected "
-                    f"{quote_text(expected_text.text)}{position}{advice and '. '}{advice}"
+                place = describe_quoting_line(clues, part, similar_text)
+                problem = Sentence(
+                    "%(problem)s; expected %(expected)s",
+                    problem=Sentence(template, place=place, text=quote_text(similar_text)),
+                    expected=expected_text.describe(),
                 )
+                yield Sentence("%(problem)s. %(advice)s", problem=problem, advice=advice) if advice else problem
                 break
 
 
@@ -111,7 +124,11 @@ def hint_about_unspoken_text(clues: Clues) -> Iterator[str]:
     )
     for text in list(candidates)[-1:]:
         location = describe_quoting_line(clues, "program", text)
-        yield f"{location} prints {quote_text(text)}, and nothing is said; expected say(...), which prints as well"
+        yield Sentence(
+            "%(place)s prints %(text)s, and nothing is said; expected say(...), which prints as well",
+            place=location,
+            text=quote_text(text),
+        )
 
 
 def hint_about_missing_series(clues: Clues) -> Iterator[str]:
@@ -123,11 +140,12 @@ def hint_about_missing_series(clues: Clues) -> Iterator[str]:
         has_label = any(is_near(label, text) or label.is_met_by(text, ignore_case=True) for text in clues.printed)
         if has_label or any(True for _ in clues.faults):
             continue
-        name = next((each.name for each in clues.programs), "the notebook")
-        yield (
-            f'{name} never prints a line such as "{criterion.series}: 42". '
-            f'Add print("{criterion.series}: " + str(...)) where the value is read. '
-            "If it is the program of another assignment, submit the right one"
+        place = next((each.locate(None) for each in clues.programs), Sentence("the notebook"))
+        yield Sentence(
+            '%(place)s never prints a line such as "%(series)s: 42". Add print("%(series)s: " + str(...)) where '
+            "the value is read. If it is the program of another assignment, submit the right one",
+            place=place,
+            series=criterion.series,
         )
         return
 
@@ -137,18 +155,19 @@ def _is_spoken(criterion: Criterion) -> bool:
 
 
 def _find_checked_texts(criterion: Criterion, clues: Clues) -> tuple[Part, Sequence[str], str]:
-    """Return the part and the texts that a criterion checks, and a verb for them; no texts for other criteria."""
+    """Return the part and the texts that a criterion checks, and a sentence on them; no texts for other criteria."""
+    prints = translatable("%(place)s prints %(text)s")
     match criterion:
         case Datalog():
-            return "program", clues.printed, "prints"
+            return "program", clues.printed, prints
         case Says():
-            return "program", clues.spoken, "says"
+            return "program", clues.spoken, translatable("%(place)s says %(text)s")
         case Prints():
-            return "program", clues.printed, "prints"
+            return "program", clues.printed, prints
         case Messages(json_queue=False, agents=()):
-            return "program", clues.sent, "sends"
+            return "program", clues.sent, translatable("%(place)s sends %(text)s")
         case Replies(path=None, agents=()):
-            return "responder", clues.answers, "answers"
+            return "responder", clues.answers, translatable("%(place)s answers %(text)s")
     return "program", (), ""
 
 
@@ -190,4 +209,4 @@ def describe_quoting_line(clues: Clues, part: Part, text: str) -> str:
             for number, line in enumerate(listing.lines, 1):
                 if len(opening) > 2 and opening in line and _QUOTE.search(line):
                     return listing.locate(number)
-    return PART_FILES[part] if any(each.part == part for each in clues.listings) else "the notebook"
+    return PART_FILES[part] if any(each.part == part for each in clues.listings) else Sentence("the notebook")

@@ -12,7 +12,10 @@ from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
 from service.grading.hint_structure import collect_statements
 from service.grading.judging.geometry import Side, compute_positions
+from service.grading.judging.message_parts import add_place
+from service.language import translatable
 from sim.recording import Floats, Recording
+from sim.sentences import Sentence
 from submissions.criteria.stopping import StopOn
 
 _COMPARISON_FUNCTIONS: Mapping[str, Callable[[float, float], bool]] = {
@@ -45,7 +48,7 @@ def hint_about_thresholds(clues: Clues) -> Iterator[str]:
                 sign, number = threshold
                 explanation = _explain_missed_zone(sign, number, *readings)
                 if explanation:
-                    yield f"{listing.locate(loop.line)}: {explanation}"
+                    yield add_place(listing.locate(loop.line), explanation)
                     return
 
 
@@ -61,7 +64,7 @@ def hint_about_joined_colours(clues: Clues) -> Iterator[str]:
                 for end_colour in end_colours:
                     explanation = _hint_about_wrong_word(listing.code, statement, end_colour, criterion.rgb)
                     if explanation:
-                        yield f"{listing.locate(statement.line)}: {explanation}"
+                        yield add_place(listing.locate(statement.line), explanation)
                         return
 
 
@@ -114,9 +117,14 @@ def _explain_missed_zone(sign: str, number: float, readings_before: Floats, zone
     if (earlier_extreme - zone_extreme if is_falling else zone_extreme - earlier_extreme) < _MIN_DIFFERENCE:
         return ""
     minimum, maximum = sorted((float(zone_extreme), float(earlier_extreme)))
-    return (
-        f"the loop continues, because the sensor reads {zone_extreme:.1f} where the robot should stop, and "
-        f"{zone_extreme:.1f} {sign} {number:g} is true. Choose a number between {minimum:.1f} and {maximum:.1f}"
+    return Sentence(
+        "the loop continues, because the sensor reads %(reading).1f where the robot should stop, and "
+        "%(reading).1f %(sign)s %(number)g is true. Choose a number between %(minimum).1f and %(maximum).1f",
+        reading=float(zone_extreme),
+        sign=sign,
+        number=number,
+        minimum=minimum,
+        maximum=maximum,
     )
 
 
@@ -140,12 +148,18 @@ def _hint_about_wrong_word(code: CodeStatements, statement: Statement, end: _Col
     decisive_comparison = comparisons[end_results.index(is_stop)]
     comparison_text = f"{decisive_comparison[0]} {decisive_comparison[1]} {decisive_comparison[2]:g}"
     colour_text = ", ".join(str(int(part)) for part in end)
-    reason = (
-        f"{word} lets {comparison_text} alone end it"
+    template = (
+        translatable(
+            "the loop ended over the colour (%(colour)s), because %(word)s lets %(comparison)s alone end it. Write "
+            "%(right)s instead of %(word)s"
+        )
         if is_stop
-        else f"{word} ends it as soon as {comparison_text} is false"
+        else translatable(
+            "the loop ended over the colour (%(colour)s), because %(word)s ends it as soon as %(comparison)s is false. "
+            "Write %(right)s instead of %(word)s"
+        )
     )
-    return f"the loop ended over the colour ({colour_text}), because {reason}. Write {other_word} instead of {word}"
+    return Sentence(template, colour=colour_text, word=word, comparison=comparison_text, right=other_word)
 
 
 _Comparison = tuple[str, str, float, int]

@@ -15,6 +15,7 @@ from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import collect_statements
 from service.grading.hint_tables import PROPERTIES
+from sim.sentences import Sentence
 
 _RARE_READING_SECONDS = 0.5
 
@@ -26,10 +27,10 @@ def hint_about_overlapping_speech(clues: Clues) -> Iterator[str]:
     for listing, statement in collect_statements(clues):
         for call in statement.calls:
             if call.name == "say" and call.arguments and not any("wait" in one for one in call.arguments):
-                arguments = format_arguments(call.arguments)
-                yield (
-                    f"{listing.locate(statement.line)}: the program continues before the words are spoken. "
-                    f"Write say({arguments}, wait=True)"
+                yield Sentence(
+                    "%(place)s: the program continues before the words are spoken. Write say(%(arguments)s, wait=True)",
+                    place=listing.locate(statement.line),
+                    arguments=format_arguments(call.arguments),
                 )
                 return
 
@@ -42,9 +43,13 @@ def hint_about_short_waits(clues: Clues) -> Iterator[str]:
     for listing, statement in collect_statements(clues):
         number = _find_sleep_seconds(listing, statement)
         if number is not None and number < answer_seconds and listing.code.list_enclosing_loops(statement):
-            yield (
-                f"{listing.locate(statement.line)} waits {number:g} s, but an answer takes {answer_seconds:.2g} s. "
-                f"Wait longer, for example {max(0.5, math.ceil(20 * answer_seconds) / 10):g} s"
+            yield Sentence(
+                "%(place)s waits %(number)g s, but an answer takes %(seconds).2g s. Wait longer, for example "
+                "%(longer)g s",
+                place=listing.locate(statement.line),
+                number=number,
+                seconds=answer_seconds,
+                longer=max(0.5, math.ceil(20 * answer_seconds) / 10),
             )
             return
 
@@ -62,9 +67,12 @@ def hint_about_rare_readings(clues: Clues) -> Iterator[str]:
         has_reading = any(token in PROPERTIES for one in (loop, *body) for token in one.tokens)
         if has_reading and statement.parent == loop.number:
             distance = _measure_top_speed(clues) * number
-            yield (
-                f"{listing.locate(statement.line)}: the loop reads the sensor only every {number:g} s, and the robot "
-                f"drives about {distance:.0f} mm in that time. Wait less, for example time.sleep(0.05)"
+            yield Sentence(
+                "%(place)s: the loop reads the sensor only every %(seconds)g s, and the robot drives about "
+                "%(distance).0f mm in that time. Wait less, for example time.sleep(0.05)",
+                place=listing.locate(statement.line),
+                seconds=number,
+                distance=distance,
             )
             return
 

@@ -15,6 +15,8 @@ from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements
 from service.grading.hint_tables import PROPERTIES
+from service.language import translatable
+from sim.sentences import Sentence, join_sentences
 from submissions.criteria.collecting import Collects
 from submissions.criteria.logs import Datalog
 from submissions.criteria.stopping import StopOn
@@ -34,9 +36,10 @@ def hint_about_unused_value(clues: Clues) -> Iterator[str]:
         name, value = statement.target, statement.tokens[2:]
         is_computed = name and (_OPERATORS & set(value) or value[-1] in PROPERTIES) and name not in value
         if is_computed and not any(_is_name_used(one, name) for one in listing.code.statements):
-            yield (
-                f"{listing.locate(statement.line)} computes {name}, but no line uses it. Write {name} where its value "
-                "is needed"
+            yield Sentence(
+                "%(place)s computes %(name)s, but no line uses it. Write %(name)s where its value is needed",
+                place=listing.locate(statement.line),
+                name=name,
             )
             return
 
@@ -60,10 +63,14 @@ def hint_about_swapped_ports(clues: Clues) -> Iterator[str]:
     if swapped_calls:
         listing, statement, name = swapped_calls[0]
         other_lines = [one.line for _, one, _ in swapped_calls[1:]]
-        lines_sentence = f" Line {other_lines[0]} has the same." if other_lines else ""
+        hint = Sentence(
+            "%(place)s takes OUTPUT_C for the left motor, so the robot turns to the other side: the left motor is on "
+            "OUTPUT_B. Write %(name)s(OUTPUT_B, OUTPUT_C).",
+            place=listing.locate(statement.line),
+            name=name,
+        )
         yield (
-            f"{listing.locate(statement.line)} takes OUTPUT_C for the left motor, so the robot turns to the other "
-            f"side: the left motor is on OUTPUT_B. Write {name}(OUTPUT_B, OUTPUT_C).{lines_sentence}"
+            join_sentences(hint, Sentence("Line %(line)s has the same.", line=other_lines[0])) if other_lines else hint
         )
 
 
@@ -78,15 +85,20 @@ def hint_about_swallowed_flags(clues: Clues) -> Iterator[str]:
             continue
         leading_flags, flag, value = match.groups()
         other_flag = flag.swapcase()
-        advice = (
-            f"-{leading_flags}{other_flag}{value}"
-            if other_flag in missing_flags
-            else f"-{leading_flags}{value}, and -{flag} with its value apart"
+        is_other_case = other_flag in missing_flags
+        template = (
+            translatable(
+                "%(place)s: -%(flag)s takes a value, so %(value)s is its value and sets no flags. Write %(fixed)s"
+            )
+            if is_other_case
+            else translatable(
+                "%(place)s: -%(flag)s takes a value, so %(value)s is its value and sets no flags. Write %(fixed)s, and "
+                "-%(flag)s with its value apart"
+            )
         )
-        yield (
-            f"{listing.locate(magic_index + 1)}: -{flag} takes a value, so {value} is its value and sets no flags. "
-            f"Write {advice}"
-        )
+        fixed_flags = f"-{leading_flags}{other_flag if is_other_case else ''}{value}"
+        place = listing.locate(magic_index + 1)
+        yield Sentence(template, place=place, flag=flag, value=value, fixed=fixed_flags)
         return
 
 
@@ -98,13 +110,16 @@ def hint_about_few_samples(clues: Clues) -> Iterator[str]:
         count = clues.find_measures(criterion).get("samples") if isinstance(criterion, Datalog) else None
         if not count or not isinstance(criterion, Datalog) or not count < criterion.at_least:
             continue
-        sentence = f"only {count:g} samples were logged, and at least {criterion.at_least} are asked for"
         sleeping_loops = _collect_sleeping_loops(clues)
         if len(sleeping_loops) == 1:
             listing, statement, seconds = sleeping_loops[0]
-            yield (
-                f"{listing.locate(statement.line)}: {sentence}. The loop waits {seconds:g} s after each of them: wait "
-                "less, and let the loop repeat more often"
+            yield Sentence(
+                "%(place)s: only %(count)g samples were logged, and at least %(least)s are asked for. The loop waits "
+                "%(seconds)g s after each of them: wait less, and let the loop repeat more often",
+                place=listing.locate(statement.line),
+                count=count,
+                least=criterion.at_least,
+                seconds=seconds,
             )
             return
 
@@ -139,9 +154,12 @@ def hint_about_few_images(clues: Clues) -> Iterator[str]:
         if not has_few_images or not measures["pairs"] or len(drive_statements) != 1 or clues.seconds > clues.limit / 4:
             continue
         listing, statement = drive_statements[0]
-        yield (
-            f"{listing.locate(statement.line)}: the robot passed the patterns in {clues.seconds:.1f} s and took only "
-            f"{measures['pairs']:g} pairs of images. Drive slower, or take images more often"
+        yield Sentence(
+            "%(place)s: the robot passed the patterns in %(seconds).1f s and took only %(count)g pairs of "
+            "images. Drive slower, or take images more often",
+            place=listing.locate(statement.line),
+            seconds=clues.seconds,
+            count=measures["pairs"],
         )
         return
 
@@ -162,10 +180,14 @@ def hint_about_partial_reading(clues: Clues) -> Iterator[str]:
         ]
         if len(loops) == 1:
             listing, statement = loops[0]
-            yield (
-                f"{listing.locate(statement.line)}: the loop ends when the edge of the sensor leaves the white area: "
-                f"it read {other_reading.reading:.2f} %, expected {minimum:g} to {maximum:g} %. Let the robot drive on "
-                "a little after the loop, for example with time.sleep(0.2)"
+            yield Sentence(
+                "%(place)s: the loop ends when the edge of the sensor leaves the white area: it read "
+                "%(reading).2f %%, expected %(least)g to %(most)g %%. Let the robot drive on a little "
+                "after the loop, for example with time.sleep(0.2)",
+                place=listing.locate(statement.line),
+                reading=other_reading.reading,
+                least=minimum,
+                most=maximum,
             )
             return
 
@@ -186,8 +208,12 @@ def hint_about_swapped_atan2(clues: Clues) -> Iterator[str]:
                 and all(map(_Y_NAME.match, second_names))
             ):
                 y, x = join_tokens(call.arguments[1]), join_tokens(call.arguments[0])
-                yield (
-                    f"{listing.locate(statement.line)}: atan2 takes y first, and then x. For the angle from the x axis "
-                    f"write {call.name}({y}, {x})"
+                yield Sentence(
+                    "%(place)s: atan2 takes y first, and then x. For the angle from the x axis write "
+                    "%(name)s(%(y)s, %(x)s)",
+                    place=listing.locate(statement.line),
+                    name=call.name,
+                    y=y,
+                    x=x,
                 )
                 return

@@ -9,6 +9,8 @@ import re
 
 from service.grading.hint_clues import Listing
 from service.grading.hint_code import Statement, is_name, join_tokens
+from service.language import translatable
+from sim.sentences import Sentence
 
 _SIDE = re.compile("left|right", re.IGNORECASE)
 _OTHER_SIDE = {"left": "right", "right": "left", "Left": "Right", "Right": "Left", "LEFT": "RIGHT", "RIGHT": "LEFT"}
@@ -23,9 +25,13 @@ def check_name_case(listing: Listing, statement: Statement) -> str:
         return ""
     if any(name in (each.tokens[1:] if each.target == name else each.tokens) for each in statements):
         return ""
-    return (
-        f"{listing.locate(statement.line)} assigns {name}, so {intended_name} stays as it is: upper and lower case are "
-        f"different. Write {intended_name} = {join_tokens(tokens[2:])}"
+    return Sentence(
+        "%(place)s assigns %(name)s, so %(intended)s stays as it is: upper and lower case are different. Write "
+        "%(intended)s = %(code)s",
+        place=listing.locate(statement.line),
+        name=name,
+        intended=intended_name,
+        code=join_tokens(tokens[2:]),
     )
 
 
@@ -44,14 +50,24 @@ def check_mixed_sides(listing: Listing, statement: Statement) -> str:
     if twin_assignment is None:
         return ""
     repeated_lines = [each.line for each in listing.code.statements if each.target == name and each.tokens[2:] == value]
-    lines_clause = (
-        ""
+    template = (
+        translatable("%(place)s gives %(name)s the same value as %(twin)s in line %(line)s: %(code)s. Write %(fixed)s")
         if len(repeated_lines) < 2
-        else f" in lines {', '.join(map(str, repeated_lines[:-1]))} and {repeated_lines[-1]}"
+        else translatable(
+            "%(place)s gives %(name)s the same value as %(twin)s in line %(line)s: %(code)s. Write %(fixed)s in lines "
+            "%(lines)s and %(last)s"
+        )
     )
-    return (
-        f"{listing.locate(statement.line)} gives {name} the same value as {twin} in line {twin_assignment.line}: "
-        f"{join_tokens(value)}. Write {name} = {join_tokens(fixed_tokens)}{lines_clause}"
+    return Sentence(
+        template,
+        place=listing.locate(statement.line),
+        name=name,
+        twin=twin,
+        line=twin_assignment.line,
+        code=join_tokens(value),
+        fixed=f"{name} = {join_tokens(fixed_tokens)}",
+        lines=", ".join(map(str, repeated_lines[:-1])),
+        last=repeated_lines[-1],
     )
 
 
@@ -78,9 +94,13 @@ def check_early_step(listing: Listing, statement: Statement) -> str:
     is_increment = step.tokens[1:] in (("+=", "1"), ("=", name, "+", "1"))
     if not is_increment or step.parent != loop.number or step.number >= statement.number:
         return ""
-    return (
-        f"{listing.locate(statement.line)}: line {step.line} has already added 1 to {name}, so {items}[{name}] skips "
-        f"the first item and goes past the last. Write {items}[{name} - 1]"
+    return Sentence(
+        "%(place)s: line %(line)s has already added 1 to %(name)s, so %(items)s[%(name)s] skips the first item "
+        "and goes past the last. Write %(items)s[%(name)s - 1]",
+        place=listing.locate(statement.line),
+        line=step.line,
+        name=name,
+        items=items,
     )
 
 
@@ -94,9 +114,13 @@ def check_removal_in_loop(listing: Listing, statement: Statement) -> str:
     if following and following[0].keyword in ("break", "return") and following[0].parent == statement.parent:
         return ""
     name, items = loop.tokens[1], loop.tokens[3]
-    return (
-        f"{listing.locate(statement.line)} removes from {items}, the list that the loop in line {loop.line} goes "
-        f"through, so the loop skips the item after it. Append each {name} that is kept to a new list"
+    return Sentence(
+        "%(place)s removes from %(items)s, the list that the loop in line %(line)s goes through, so the loop "
+        "skips the item after it. Append each %(name)s that is kept to a new list",
+        place=listing.locate(statement.line),
+        items=items,
+        line=loop.line,
+        name=name,
     )
 
 
@@ -120,20 +144,26 @@ def check_unreachable_if(listing: Listing, statement: Statement) -> str:
         alternatives = _parse_comparisons(earlier_statement, "or")
         is_exit = bool(body) and body[-1].parent == earlier_statement.number and body[-1].keyword in _EXIT_KEYWORDS
         if (in_chain or is_exit) and any(_implies(one, other) for one in conjuncts for other in alternatives[1:]):
-            return (
-                f"{listing.locate(statement.line)} is never true: line {earlier_statement.line} has already found that "
-                f"{join_tokens(earlier_statement.condition)}. Remove what line {statement.line} asks from line "
-                f"{earlier_statement.line}, or move line {statement.line} above it"
+            return Sentence(
+                "%(place)s is never true: line %(line)s has already found that %(condition)s. Remove what line "
+                "%(later)s asks from line %(line)s, or move line %(later)s above it",
+                place=listing.locate(statement.line),
+                line=earlier_statement.line,
+                condition=join_tokens(earlier_statement.condition),
+                later=statement.line,
             )
         if (
             (in_chain or is_exit)
             and earlier_conjuncts
             and all(any(_implies(one, other) for one in conjuncts) for other in earlier_conjuncts)
         ):
-            return (
-                f"{listing.locate(statement.line)} is never true: wherever {join_tokens(statement.condition)}, line "
-                f"{earlier_statement.line} has already found that {join_tokens(earlier_statement.condition)}. Move "
-                f"this condition above line {earlier_statement.line}"
+            return Sentence(
+                "%(place)s is never true: wherever %(later)s, line %(line)s has already found that "
+                "%(earlier)s. Move this condition above line %(line)s",
+                place=listing.locate(statement.line),
+                later=join_tokens(statement.condition),
+                line=earlier_statement.line,
+                earlier=join_tokens(earlier_statement.condition),
             )
         in_chain = in_chain and earlier_statement.keyword == "elif"
     return ""
