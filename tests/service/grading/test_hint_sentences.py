@@ -1,0 +1,41 @@
+"""Hints can be translated: every text for people in their modules is a sentence, not plain English."""
+
+import ast
+import re
+from collections.abc import Iterator
+from importlib.resources import files
+
+import pytest
+
+_MODULES = (
+    *("amounts", "discarded_values", "logic", "loops", "motion", "names", "operands", "outputs", "passes"),
+    *("recognition", "repetition", "responder", "scale", "signatures", "skipped_loops", "slips", "structure"),
+    *("syntax", "texts", "thresholds", "timing", "values", "variables"),
+)
+#: Two words with a blank between them.
+_PROSE = re.compile(r"[a-z]{2,} [a-z]{2,}")
+#: Calls whose texts are translated, or are no texts for people.
+_OTHER_CALLS = frozenset({"Sentence", "translatable", "compile", "findall", "fullmatch"})
+#: Texts of Python, of cells and of the simulator, which the rules search for.
+_SEARCHED_TEXTS = frozenset({"responder again", "image data logged...", "bound method"})
+
+
+def _find_plain_texts(node: ast.AST) -> Iterator[str]:
+    """Yield the English texts outside sentences, docstrings and patterns."""
+    match node:
+        case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)) if name in _OTHER_CALLS:
+            for each in node.keywords:
+                yield from _find_plain_texts(each.value)
+            return
+        case ast.Expr(value=ast.Constant()):
+            return
+        case ast.Constant(value=str() as text) if _PROSE.search(text) and text not in _SEARCHED_TEXTS:
+            yield text
+    for child in ast.iter_child_nodes(node):
+        yield from _find_plain_texts(child)
+
+
+@pytest.mark.parametrize("module", _MODULES)
+def test_every_text_for_people_is_a_sentence(module: str) -> None:
+    source = files("service.grading").joinpath(f"hint_{module}.py").read_text("utf-8")
+    assert not list(_find_plain_texts(ast.parse(source)))
