@@ -31,13 +31,23 @@ class Language:
         """Translate a sentence created elsewhere, including nested sentences. Other text stays as it is."""
         if not isinstance(sentence, Sentence):
             return sentence
+        template = self._translate_template(sentence.template) if sentence.template else ""
         if not sentence.values:
-            return self.catalogue.gettext(sentence.template) if sentence.template else ""
+            return template
         translated_parts = {
             name: self.translate_sentence(part) if isinstance(part, Sentence) else part
             for name, part in sentence.values.items()
         }
-        return self.say(sentence.template, **translated_parts)
+        return template % translated_parts
+
+    def _translate_template(self, template: str) -> str:
+        """Return the translated template. A clause (``make_clause``) may have only the translation of its sentence."""
+        capitalised = template[:1].upper() + template[1:]
+        for known_template in dict.fromkeys((template, capitalised, f"{template}.", f"{capitalised}.")):
+            translation = self.catalogue.gettext(known_template)
+            if translation != known_template:
+                return translation.removesuffix(".") if known_template[-1] != template[-1] else translation
+        return template
 
     def counted(self, singular: str, plural: str, count: int, /, **parts: object) -> str:
         """Translate a sentence in the singular or plural; ``count`` is available as a part."""

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Self
 
@@ -50,3 +51,32 @@ def join_sentences(*sentences: str) -> str:
     """Join sentences with spaces; empty ones are left out."""
     first, *others = [each for each in sentences if each] or [""]
     return Sentence(_PAIR, first=first, second=join_sentences(*others)) if others else first
+
+
+_FIRST_PART, _LAST_PART = re.compile(r"%\((\w+)\)s"), re.compile(r".*%\((\w+)\)s\Z", re.DOTALL)
+
+
+def make_clause(sentence: str) -> str:
+    """Return a sentence as a part of another one: with a small first letter, and without its final full stop.
+
+    Where the catalogue has only the whole sentence, ``service.language`` translates that, without its full stop.
+    """
+    return drop_full_stop(_change_edge(sentence, _FIRST_PART, lambda text: text[:1].lower() + text[1:]))
+
+
+def drop_full_stop(sentence: str) -> str:
+    """Return a sentence without its final full stop."""
+    return _change_edge(sentence, _LAST_PART, lambda text: text.rstrip("."))
+
+
+def _change_edge(sentence: str, edge: re.Pattern[str], change: Callable[[str], str]) -> str:
+    """Return the sentence with the change made to its template, or to the value at this edge of it."""
+    if not isinstance(sentence, Sentence):
+        return change(sentence)
+    match = edge.match(sentence.template) if sentence.values else None
+    value = sentence.values[match[1]] if match is not None else None
+    if match is None:
+        return Sentence(change(sentence.template), **sentence.values)
+    if not isinstance(value, str):
+        return sentence
+    return Sentence(sentence.template, **{**sentence.values, match[1]: _change_edge(value, edge, change)})

@@ -17,6 +17,7 @@ from service.grading.hint_code import CodeStatements, read_code
 from service.grading.run_plan import RunPlan
 from sim.recording import Fault, Message, Recording
 from sim.recording_values import collect_faults, is_stationary
+from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 from submissions.raw_files import sanitise_name
@@ -59,7 +60,7 @@ class Listing:
 
     def locate(self, line: int | None) -> str:
         """Return ``line 3 of robot.py``, or only the name if the line is unknown."""
-        return self.name if line is None else f"line {line} of {self.name}"
+        return self.name if line is None else Sentence("line %(line)s of %(name)s", line=line, name=self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +210,7 @@ class Clues:
             line = listing.find_line(pattern)
             if line is not None:
                 return listing.locate(line)
-        return PART_FILES[part] if any(each.part == part for each in self.listings) else "the notebook"
+        return PART_FILES[part] if any(each.part == part for each in self.listings) else Sentence("the notebook")
 
     def _collect_messages(self, sender: str) -> tuple[str, ...]:
         return _collect_distinct_texts(
@@ -267,7 +268,7 @@ def remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -
     findings = {index: each for index, each in result.findings.items() if index is None or index in visible_indices}
     if len(evidence) == len(result.evidence):
         return result
-    message = " ".join(each.message for each in evidence if not each.passed)
+    message = join_sentences(*(each.message for each in evidence if not each.passed))
     accuracy = result.shown.accuracy if result.shown is not None else None
     return replace(
         result,
@@ -290,7 +291,7 @@ def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
     if second_program is not None:
         yield _build_listing(SECOND_PROGRAM, "program", second_program.text)
     for cell in submission.notebook.cells if submission.notebook is not None else ():
-        yield _build_listing(f"cell {cell.number}", None, cell.source)
+        yield _build_listing(name_cell(cell.number), None, cell.source)
 
 
 def _build_extra_listings(submission: Submission) -> Iterator[Listing]:
@@ -345,6 +346,11 @@ def name_faulty_text(fault: Fault) -> str:
     if fault.file:
         return fault.file
     if fault.cell is not None:
-        return f"cell {fault.cell}"
+        return name_cell(fault.cell)
     parts = {"program": "robot.py", "responder": "responder.py", "second program": SECOND_PROGRAM}
     return f"{fault.agent}.py" if fault.agent else parts.get(fault.who, "")
+
+
+def name_cell(number: int) -> str:
+    """Return the name of a notebook's cell in hints."""
+    return Sentence("cell %(number)s", number=number)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from responders.message_format import PY
+from sim.sentences import Sentence
 
 _MAX_CHARACTERS = 20_000
 #: Factors between units, as programs write them.
@@ -23,13 +24,14 @@ def advise_on_difference(expected: object, actual: object) -> str:
     """Return what to change, if the two values show it; otherwise empty."""
     match expected, actual:
         case bool(), _:
-            return "Check the condition: it is the opposite of the right one" if actual is (not expected) else ""
+            is_opposite = actual is (not expected)
+            return Sentence("Check the condition: it is the opposite of the right one") if is_opposite else ""
         case (int() | float()) as number, (int() | float()) as other if not isinstance(other, bool):
             return _advise_on_numbers(number, other)
         case ((int() | float()), str()):
-            return "It is a text: convert it with int() or float()"
+            return Sentence("It is a text: convert it with int() or float()")
         case str(), (int() | float()):
-            return "It is a number: convert it with str()"
+            return Sentence("It is a number: convert it with str()")
         case list(), list():
             return _advise_on_lists(expected, actual)
         case str(), str():
@@ -42,15 +44,17 @@ def _advise_on_numbers(expected: float, actual: float) -> str:
     if not difference:
         return ""
     if actual and expected == -actual:
-        return "Only the sign is wrong"
-    if abs(difference) == 1:
-        size, fix = ("small", "add 1") if difference > 0 else ("large", "subtract 1")
-        return f"It is 1 too {size}: check where the count begins and when it is increased, or {fix}"
+        return Sentence("Only the sign is wrong")
+    if difference == 1:
+        return Sentence("It is 1 too small: check where the count begins and when it is increased, or add 1")
+    if difference == -1:
+        return Sentence("It is 1 too large: check where the count begins and when it is increased, or subtract 1")
     factor = expected / actual if actual else math.inf
     for ratio in (factor, 1 / factor if factor else math.inf):
         if 1.5 < ratio < 1000.5 and abs(ratio - round(ratio)) < 1e-6 * ratio:
-            size = "small: multiply" if ratio == factor else "large: divide"
-            return f"It is {round(ratio)} times too {size} by {round(ratio)}"
+            if ratio == factor:
+                return Sentence("It is %(ratio)s times too small: multiply by %(ratio)s", ratio=round(ratio))
+            return Sentence("It is %(ratio)s times too large: divide by %(ratio)s", ratio=round(ratio))
     return describe_factor(factor, factor)
 
 
@@ -66,10 +70,12 @@ def _find_list_in_text(expected: str, actual: str) -> str:
         values = re.findall(r"""['"](\w+)['"]: ['"]([^'"]*)['"]""", match[0])
         value = expected[len(start) : len(expected) - len(end)]
         key = next((key for key, found in values if found == value), "")
-        return f'The object is written as a whole: take its value with ["{key}"]' if key else ""
+        return Sentence('The object is written as a whole: take its value with ["%(key)s"]', key=key) if key else ""
     entries = [each.strip(" '\"") for each in match[0][1:-1].split(",")]
     entry = expected[len(start) : len(expected) - len(end)]
-    return f"{match[0]} is a list: take one entry, [{entries.index(entry)}]" if entry in entries else ""
+    if entry not in entries:
+        return ""
+    return Sentence("%(list)s is a list: take one entry, [%(index)s]", list=match[0], index=entries.index(entry))
 
 
 def describe_factor(minimum: float, maximum: float) -> str:
@@ -78,40 +84,40 @@ def describe_factor(minimum: float, maximum: float) -> str:
         return ""
     for name, factor in _FACTORS.items():
         if minimum <= factor * _TOLERANCE and factor / _TOLERANCE <= maximum:
-            return f"It is {factor:g} times too small: multiply by {name}"
+            return Sentence("It is %(factor)g times too small: multiply by %(code)s", factor=factor, code=name)
         if minimum <= _TOLERANCE / factor and 1 / (factor * _TOLERANCE) <= maximum:
-            return f"It is {factor:g} times too large: divide by {name}"
+            return Sentence("It is %(factor)g times too large: divide by %(code)s", factor=factor, code=name)
     return ""
 
 
 def _advise_on_lists(expected: Sequence[object], actual: Sequence[object]) -> str:
     if any(isinstance(each, list) for each in actual) and not any(isinstance(each, list) for each in expected):
-        return "It contains whole lists: append one value of the list each time"
+        return Sentence("It contains whole lists: append one value of the list each time")
     if list(actual) == list(reversed(expected)):
-        return "It is in the reverse order"
+        return Sentence("It is in the reverse order")
     if len(actual) < len(expected) and all(each in expected for each in actual):
-        return "Values are missing: check the condition that leaves them out, and where the loop ends"
+        return Sentence("Values are missing: check the condition that leaves them out, and where the loop ends")
     if len(actual) > len(expected) and all(each in actual for each in expected):
-        return "It has too many values: check the condition that should leave them out"
+        return Sentence("It has too many values: check the condition that should leave them out")
     return ""
 
 
 def _advise_on_texts(expected: str, actual: str) -> str:
     if actual and expected.endswith(actual):
-        return f'"{expected.removesuffix(actual)}" is missing at its start'
+        return Sentence('"%(text)s" is missing at its start', text=expected.removesuffix(actual))
     if actual and expected.startswith(actual):
-        return f'"{expected.removeprefix(actual)}" is missing at its end'
+        return Sentence('"%(text)s" is missing at its end', text=expected.removeprefix(actual))
     if expected and actual.endswith(expected):
-        return f'Remove "{actual.removesuffix(expected)}" at its start'
+        return Sentence('Remove "%(text)s" at its start', text=actual.removesuffix(expected))
     if actual.replace(PY, "", 1) == expected:
-        return f'Take {PY} off the message first: text.removeprefix("{PY}")'
+        return Sentence('Take %(prefix)s off the message first: text.removeprefix("%(prefix)s")', prefix=PY)
     if actual.casefold() == expected.casefold():
-        return f'Only capital and small letters differ: write "{expected}"'
+        return Sentence('Only capital and small letters differ: write "%(text)s"', text=expected)
     if _SIGNS.sub("", actual) == _SIGNS.sub("", expected):
-        return f'Only signs differ: write "{expected}"'
+        return Sentence('Only signs differ: write "%(text)s"', text=expected)
     entry = _find_list_in_text(expected, actual)
     if entry:
         return entry
     if "".join(actual.split()) == "".join(expected.split()):
-        return "Only blanks differ"
+        return Sentence("Only blanks differ")
     return ""

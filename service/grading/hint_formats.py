@@ -13,6 +13,7 @@ from responders.message_format import IMG_DATA, JSON, PY, classify_text
 from service.grading.fault_kinds import FaultKind, is_kind
 from service.grading.hint_clues import Clues, Listing, name_faulty_text
 from service.grading.judging.message_parts import quote_text
+from sim.sentences import Sentence
 from submissions.file_kinds import find_similar_file
 from submissions.notebook import NEARLY_MAGIC
 from submissions.raw_files import sanitise_name
@@ -37,9 +38,10 @@ def hint_about_missing_files(clues: Clues) -> Iterator[str]:
     """Yield a hint on a part that was submitted under a similar file name."""
     similar_name = find_similar_file(clues.missing, clues.files) if clues.missing is not None else ""
     if clues.missing is not None and similar_name:
-        yield (
-            f"there is {sanitise_name(similar_name)}, but no {PART_FILES[clues.missing]}; expected that name, so "
-            "rename it"
+        yield Sentence(
+            "there is %(similar)s, but no %(file)s; expected that name, so rename it",
+            similar=sanitise_name(similar_name),
+            file=PART_FILES[clues.missing],
         )
 
 
@@ -51,7 +53,9 @@ def hint_about_empty_parts(clues: Clues) -> Iterator[str]:
             and not listing.code.statements
             and all(not line.strip() or line.lstrip().startswith("#") for line in listing.lines)
         ):
-            yield f"{listing.name} is empty. Write your program in it, save it, and submit it again"
+            yield Sentence(
+                "%(file)s is empty. Write your program in it, save it, and submit it again", file=listing.name
+            )
             return
 
 
@@ -72,22 +76,31 @@ def hint_about_magics(clues: Clues) -> Iterator[str]:
                 yield _hint_about_magic(listing, number, line)
                 return
             if number in lines and _NOTEBOOK_LINE.match(line):
-                yield f"{listing.locate(number)} is {quote_text(line)}, which only a notebook can run; expected Python"
+                yield Sentence(
+                    "%(place)s is %(code)s, which only a notebook can run; expected Python",
+                    place=listing.locate(number),
+                    code=quote_text(line),
+                )
                 return
 
 
 def _hint_about_magic(listing: Listing, number: int, line: str) -> str:
-    description = f"{listing.locate(number)} is {quote_text(line)}"
+    place, code = listing.locate(number), quote_text(line)
     if listing.part == "responder":
-        return f"{description}, which begins a robot program; expected it in robot.py alone"
+        return Sentence(
+            "%(place)s is %(code)s, which begins a robot program; expected it in robot.py alone", place=place, code=code
+        )
     code_line = next((n for n, text in enumerate(listing.lines[: number - 1], 1) if not _is_empty_line(text)), None)
     if code_line is not None:
-        code = quote_text(listing.lines[code_line - 1])
-        return (
-            f"{description}, but line {code_line}, {code}, stands above it; expected only blank lines and comments "
-            "there"
+        return Sentence(
+            "%(place)s is %(code)s, but line %(other_line)s, %(other_code)s, stands above it; expected only blank "
+            "lines and comments there",
+            place=place,
+            code=code,
+            other_line=code_line,
+            other_code=quote_text(listing.lines[code_line - 1]),
         )
-    return f"{description}; expected %%sim_magic_preloaded and its flags"
+    return Sentence("%(place)s is %(code)s; expected %%%%sim_magic_preloaded and its flags", place=place, code=code)
 
 
 def hint_about_messages(clues: Clues) -> Iterator[str]:
@@ -98,17 +111,22 @@ def hint_about_messages(clues: Clues) -> Iterator[str]:
         late_match = _LATE_PY.match(text)
         if late_match and not clues.sent and not text.startswith(PY):
             location = clues.describe_matching_line("program", re.compile(r"""["'](?:PY::|IMG_DATA)"""))
-            yield (
-                f"{location} prints {quote_text(text)}, which is not sent as a message; expected "
-                f"{quote_text(late_match[1])} at the start of the text. Print the other words with a print of their own"
+            yield Sentence(
+                "%(place)s prints %(text)s, which is not sent as a message; expected %(message)s at the start of the "
+                "text. Print the other words with a print of their own",
+                place=location,
+                text=quote_text(text),
+                message=quote_text(late_match[1]),
             )
             return
         prefix_match = _NEARLY_PY.match(text)
         if prefix_match and not text.startswith(PY):
-            yield (
-                f"{clues.describe_matching_line('program', _build_literal_pattern(prefix_match[0]))} prints "
-                f'"{text[:60]}", which is not sent as a message; '
-                f'expected "{PY}" at its very start, in capitals, with two colons and no blank'
+            yield Sentence(
+                '%(place)s prints "%(text)s", which is not sent as a message; expected "%(prefix)s" at its very start, '
+                "in capitals, with two colons and no blank",
+                place=clues.describe_matching_line("program", _build_literal_pattern(prefix_match[0])),
+                text=text[:60],
+                prefix=PY,
             )
             return
 
@@ -131,9 +149,11 @@ def hint_about_images(clues: Clues) -> Iterator[str]:
         location = clues.describe_matching_line(
             "program", _build_literal_pattern("image_data" if text == _NO_SIDE else printed_prefix)
         )
-        yield (
-            f'{location} prints {quote_text(printed_text)}, which sends no image; expected "{IMG_DATA}" and nothing '
-            "before it"
+        yield Sentence(
+            '%(place)s prints %(text)s, which sends no image; expected "%(word)s" and nothing before it',
+            place=location,
+            text=quote_text(printed_text),
+            word=IMG_DATA,
         )
         return
 
@@ -142,9 +162,10 @@ def hint_about_image_log(clues: Clues) -> Iterator[str]:
     """Yield a hint on a print that logs no image because it names no side."""
     if not clues.collaborative and clues.lost and _NO_SIDE in clues.printed:
         location = clues.describe_matching_line("program", _build_literal_pattern("image_data"))
-        yield (
-            f'{location} prints "image_data" without a side, so no image is logged. Write "image_data both", '
-            '"image_data left" or "image_data right"'
+        yield Sentence(
+            '%(place)s prints "image_data" without a side, so no image is logged. Write "image_data both", '
+            '"image_data left" or "image_data right"',
+            place=location,
         )
 
 
@@ -158,9 +179,12 @@ def hint_about_quoted_names(clues: Clues) -> Iterator[str]:
         if any(variable in each.bound_names for listing in clues.programs for each in listing.code.statements):
             location = clues.describe_matching_line("program", re.compile(re.escape(f"{PY}{match[1]}")))
             fixed_text = f'f"{PY}{{{variable}}}"'
-            yield (
-                f'{location} sends {quote_text(text)}: the name, and not its value such as "{PY}0"; expected '
-                f"{fixed_text}"
+            yield Sentence(
+                '%(place)s sends %(text)s: the name, and not its value such as "%(example)s"; expected %(code)s',
+                place=location,
+                text=quote_text(text),
+                example=f"{PY}0",
+                code=fixed_text,
             )
             return
 
@@ -181,8 +205,13 @@ def hint_about_answers(clues: Clues) -> Iterator[str]:
             location = describe_return_line(text, clues)
         else:
             continue
-        explanation = f'which is not added to the message queue; expected "{JSON}" at its very start'
-        yield f"{location}: the answer is {quote_text(text)}, {explanation}"
+        yield Sentence(
+            "%(place)s: the answer is %(answer)s, which is not added to the message queue; expected "
+            '"%(prefix)s" at its very start',
+            place=location,
+            answer=quote_text(text),
+            prefix=JSON,
+        )
         return
 
 

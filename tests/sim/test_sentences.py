@@ -9,7 +9,7 @@ import pickle
 import pytest
 
 from service.language import Language
-from sim.sentences import Sentence, join_sentences, join_with_and
+from sim.sentences import Sentence, drop_full_stop, join_sentences, join_with_and, make_clause
 
 
 class _Brackets(gettext.NullTranslations):
@@ -53,3 +53,27 @@ def test_joined_sentences_are_translated_one_by_one() -> None:
 def test_a_template_that_does_not_fit_its_values_is_an_error(template: str, error: type[Exception]) -> None:
     with pytest.raises(error):
         Sentence(template, y="text")
+
+
+class _German(gettext.NullTranslations):
+    def gettext(self, message: str) -> str:
+        return {"It took %(t)g s.": "Es dauerte %(t)g s.", "In all": "In allen", "%(a)s: %(b)s": "%(a)s: %(b)s"}.get(
+            message, message
+        )
+
+
+@pytest.mark.parametrize(
+    ("sentence", "clause", "translation"),
+    [
+        (Sentence("It took %(t)g s.", t=2.0), "it took 2 s", "Es dauerte 2 s"),
+        (Sentence("%(a)s: %(b)s", a=Sentence("In all"), b="Four."), "in all: Four", "In allen: Four"),
+        (Sentence("%(a)s: %(b)s", a=2, b=3), "2: 3", "2: 3"),
+        ("Plain text.", "plain text", "plain text"),
+        ("", "", ""),
+    ],
+)
+def test_a_clause_of_a_sentence_is_translated_as_that_sentence(sentence: str, clause: str, translation: str) -> None:
+    made = make_clause(sentence)
+    assert made == clause
+    assert Language("de", _German()).translate_sentence(made) == translation
+    assert drop_full_stop(sentence) == str(sentence).rstrip(".")
