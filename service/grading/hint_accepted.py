@@ -13,6 +13,8 @@ from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
 from service.grading.hint_texts import ExpectedText, describe_quoting_line, is_near
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
+from sim.sentences import Sentence, join_with_and
 from submissions.submission import Part
 
 _QUOTED = re.compile(r'"([^"]{6,60})"')
@@ -23,9 +25,9 @@ _VARIABLE_TEXT = re.compile(r"\d|[{}<>:]")
 def hint_about_other_words(clues: Clues) -> Iterator[str]:
     """Yield a hint on a text that has other words than the description quotes."""
     texts: Sequence[tuple[Part, str, Sequence[str]]] = (
-        ("program", "says", clues.spoken),
-        ("program", "prints", clues.printed),
-        ("responder", "answers", clues.answers),
+        ("program", translatable("%(place)s says %(text)s; the assignment requires %(required)s"), clues.spoken),
+        ("program", translatable("%(place)s prints %(text)s; the assignment requires %(required)s"), clues.printed),
+        ("responder", translatable("%(place)s answers %(text)s; the assignment requires %(required)s"), clues.answers),
     )
     for quotation in _QUOTED.findall(_join_task_lines(clues)):
         opening = quotation.partition("...")[0].strip()
@@ -34,11 +36,15 @@ def hint_about_other_words(clues: Clues) -> Iterator[str]:
         expected = ExpectedText(opening, "contains")
         if any(expected.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
             continue
-        for part, verb, part_texts in texts:
+        for part, template, part_texts in texts:
             similar_text = next((text for text in part_texts if is_near(expected, text)), None)
             if similar_text is not None:
-                location = describe_quoting_line(clues, part, similar_text)
-                yield f"{location} {verb} {quote_text(similar_text)}; the assignment requires {quote_text(opening)}"
+                yield Sentence(
+                    template,
+                    place=describe_quoting_line(clues, part, similar_text),
+                    text=quote_text(similar_text),
+                    required=quote_text(opening),
+                )
                 return
 
 
@@ -51,9 +57,12 @@ def hint_about_missing_keys(clues: Clues) -> Iterator[str]:
     answer_keys = {key for text in answers for key in _KEY.findall(text)}
     missing_keys = [key for key in required_keys if key not in answer_keys]
     if missing_keys and answer_keys:
-        location = describe_return_line(answers[0], clues, RETURN_LINE)
-        keys = " and ".join(map(quote_text, missing_keys[:3]))
-        yield f"{location}: the answer is {quote_text(answers[0])}, without {keys}, which the assignment requires"
+        yield Sentence(
+            "%(place)s: the answer is %(answer)s, without %(keys)s, which the assignment requires",
+            place=describe_return_line(answers[0], clues, RETURN_LINE),
+            answer=quote_text(answers[0]),
+            keys=join_with_and([quote_text(key) for key in missing_keys[:3]]),
+        )
 
 
 def _join_task_lines(clues: Clues) -> str:

@@ -11,6 +11,8 @@ from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement
 from service.grading.hint_functions import describe_missing_return
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
+from sim.sentences import Sentence
 from submissions.criteria.agent_pairs import AgentPairCriterion
 from submissions.criteria.replies import Replies
 
@@ -41,10 +43,18 @@ def hint_about_unasked_agent(clues: Clues) -> Iterator[str]:
         wrong = next(((each, name) for each, name in calls if name in clues.agents and name not in allowed), None)
         if wrong is not None:
             statement, name = wrong
-            fix = f"Write {pair[1]}(...) in place of {name}(...)"
-            yield f"{listing.locate(statement.line)} asks {name}; expected {pair[1]}. {fix}"
+            yield Sentence(
+                "%(place)s asks %(agent)s; expected %(expected)s. Write %(expected)s(...) in place of %(agent)s(...)",
+                place=listing.locate(statement.line),
+                agent=name,
+                expected=pair[1],
+            )
         else:
-            yield f"{listing.name} never asks {pair[1]}. Call {pair[1]}(...) in it, and use what it returns"
+            yield Sentence(
+                "%(file)s never asks %(agent)s. Call %(agent)s(...) in it, and use what it returns",
+                file=listing.name,
+                agent=pair[1],
+            )
         return
 
 
@@ -62,11 +72,18 @@ def hint_about_text_of_agent(clues: Clues) -> Iterator[str]:
             each for each in listing.code.list_body(head) if any(call.name in _CONVERSIONS for call in each.calls)
         ]
         line = conversions[0].line if len(conversions) == 1 else head.line
-        kind = "list" if isinstance(criterion.expect[question], list) else "dictionary"
-        yield (
-            f"{listing.locate(line)}: {head.tokens[1]} answers {quote_text(question)} with a text; expected a {kind}. "
-            "Write ast.literal_eval(...), which makes the object from the text; int(...) reads numbers only"
+        template = (
+            translatable(
+                "%(place)s: %(agent)s answers %(question)s with a text; expected a list. Write ast.literal_eval(...), "
+                "which makes the object from the text; int(...) reads numbers only"
+            )
+            if isinstance(criterion.expect[question], list)
+            else translatable(
+                "%(place)s: %(agent)s answers %(question)s with a text; expected a dictionary. Write "
+                "ast.literal_eval(...), which makes the object from the text; int(...) reads numbers only"
+            )
         )
+        yield Sentence(template, place=listing.locate(line), agent=head.tokens[1], question=quote_text(question))
         return
 
 

@@ -18,8 +18,10 @@ from service.grading.hint_code import join_tokens
 from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
 from sim.readers.json_text import read_json
 from sim.readers.reader_errors import UnreadableDataError
+from sim.sentences import Sentence, join_with_and
 from submissions.criteria.logs import ImageLog
 from submissions.criteria.replies import Replies
 from submissions.criteria.reporting import Reports
@@ -45,9 +47,13 @@ def hint_about_other_keys(clues: Clues) -> Iterator[str]:
         for answer in clues.answers if path else ():
             sibling_keys = _list_sibling_keys(answer, path)
             if sibling_keys and not any(expected_key in _list_sibling_keys(each, path) for each in clues.answers):
-                keys = " and ".join(map(quote_text, sibling_keys[:3]))
                 line = _describe_key_line(sibling_keys, clues) or describe_return_line(answer, clues, RETURN_LINE)
-                yield f"{line}: the answer has {keys}; expected the key {quote_text(expected_key)}"
+                yield Sentence(
+                    "%(place)s: the answer has %(keys)s; expected the key %(expected)s",
+                    place=line,
+                    keys=join_with_and([quote_text(key) for key in sibling_keys[:3]]),
+                    expected=quote_text(expected_key),
+                )
                 return
     yield from _hint_about_near_keys(clues)
 
@@ -67,9 +73,11 @@ def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     )
     line = _describe_key_line([similar_key], clues) if similar_key and key not in answer_keys else ""
     if line:
-        yield (
-            f"{line} answers the key {quote_text(similar_key)}; the assignment requires {quote_text(key)}. Write "
-            f"{quote_text(key)}"
+        yield Sentence(
+            "%(place)s answers the key %(key)s; the assignment requires %(required)s. Write %(required)s",
+            place=line,
+            key=quote_text(similar_key),
+            required=quote_text(key),
         )
 
 
@@ -89,9 +97,12 @@ def hint_about_none_answers(clues: Clues) -> Iterator[str]:
     listing, statement = returns[0]
     condition = next((one for one in listing.code.list_enclosing(statement) if one.keyword in ("if", "elif")), None)
     if condition is not None:
-        yield (
-            f"{listing.locate(statement.line)} returns None, and the answer was {quote_text(answer)}. Check the "
-            f"condition in line {condition.line}: {join_tokens(condition.condition)}"
+        yield Sentence(
+            "%(place)s returns None, and the answer was %(answer)s. Check the condition in line %(line)s: %(code)s",
+            place=listing.locate(statement.line),
+            answer=quote_text(answer),
+            line=condition.line,
+            code=join_tokens(condition.condition),
         )
 
 
@@ -112,9 +123,15 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
         expected = next((each for each in criterion.expect.values() if str(each).endswith(answer.text)), "")
         advice = advise_on_difference(expected, answer.text) if expected and isinstance(expected, str) else ""
         if answer.text.startswith("["):
-            advice = "It is a list or an array: take its first value with [0]"
+            advice = Sentence("It is a list or an array: take its first value with [0]")
         if advice:
-            yield f"{location} answers {quote_text(answer.text)} at {path}. {advice}"
+            yield Sentence(
+                "%(place)s answers %(answer)s at %(path)s. %(advice)s",
+                place=location,
+                answer=quote_text(answer.text),
+                path=path,
+                advice=advice,
+            )
             return
 
 
@@ -131,7 +148,10 @@ def _describe_value_difference(criterion: Replies, clues: Clues) -> str:
                 continue
             advice = advise_on_difference(expected, value)
             location = _describe_words_line(value, clues) or _describe_key_line([path.rpartition(".")[2]], clues)
-            return f"{location} answers {quote_text(value)}. {advice}" if advice and location else ""
+            if not advice or not location:
+                return ""
+            answer = quote_text(value)
+            return Sentence("%(place)s answers %(answer)s. %(advice)s", place=location, answer=answer, advice=advice)
     return ""
 
 
@@ -147,12 +167,18 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
         key, shift = pairs.pop()
         location = _describe_key_line([key], clues)
         if location and shift:
-            fix = f"add {shift}" if shift > 0 else f"subtract {-shift}"
-            size = "small" if shift > 0 else "large"
-            yield (
-                f"{location}: {quote_text(key)} is {abs(shift)} too {size} in every answer. Correct how it is counted: "
-                f"{fix}"
+            template = (
+                translatable(
+                    "%(place)s: %(key)s is %(amount)s too small in every answer. Correct how it is counted: add "
+                    "%(amount)s"
+                )
+                if shift > 0
+                else translatable(
+                    "%(place)s: %(key)s is %(amount)s too large in every answer. Correct how it is counted: subtract "
+                    "%(amount)s"
+                )
             )
+            yield Sentence(template, place=location, key=quote_text(key), amount=abs(shift))
             return
 
 
@@ -179,9 +205,14 @@ def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
                 continue
             location = _describe_key_line([key], clues)
             if location:
-                yield (
-                    f"{location}: {quote_text(key)} is {values[key]}; expected {number}, which {quote_text(other_key)} "
-                    f"has. Check the values of {quote_text(key)} and {quote_text(other_key)}: they may be swapped"
+                yield Sentence(
+                    "%(place)s: %(key)s is %(value)s; expected %(expected)s, which %(other_key)s has. Check the values "
+                    "of %(key)s and %(other_key)s: they may be swapped",
+                    place=location,
+                    key=quote_text(key),
+                    value=str(values[key]),
+                    expected=number,
+                    other_key=quote_text(other_key),
                 )
                 return
 
@@ -198,10 +229,13 @@ def hint_about_text_numbers(clues: Clues) -> Iterator[str]:
         pattern = re.compile(rf"""\[["']{key}["']\]\s*(?:==|!=|<|>)(?!\s*["'])""")
         listing = next((each for each in clues.programs if each.find_line(pattern)), None)
         if listing is not None:
-            yield (
-                f"{_describe_key_line([key], clues) or 'responder.py'} sends {quote_text(key)} as the text "
-                f"{quote_text(match[2])}, and {listing.locate(listing.find_line(pattern))} compares it with a number. "
-                "Write int(...) around the text"
+            yield Sentence(
+                "%(place)s sends %(key)s as the text %(text)s, and %(program_place)s compares it with a number. Write "
+                "int(...) around the text",
+                place=_describe_key_line([key], clues) or "responder.py",
+                key=quote_text(key),
+                text=quote_text(match[2]),
+                program_place=listing.locate(listing.find_line(pattern)),
             )
             return
 
@@ -215,7 +249,12 @@ def hint_about_image_command(clues: Clues) -> Iterator[str]:
         if similarity >= 0.75 and not _IMAGE_LOG.match(text) and "logged..." not in text:
             location = clues.describe_matching_line("program", re.compile(re.escape(text)))
             side = next((each for each in ("right", "both") if each in text), "left")
-            yield f'{location} prints {quote_text(text)}, which logs no image; expected "image_data {side}"'
+            yield Sentence(
+                '%(place)s prints %(text)s, which logs no image; expected "image_data %(side)s"',
+                place=location,
+                text=quote_text(text),
+                side=side,
+            )
             return
 
 
@@ -229,9 +268,11 @@ def hint_about_quoted_object(clues: Clues) -> Iterator[str]:
                 continue
             location = _describe_key_line([match[1]], clues)
             if location:
-                yield (
-                    f"{location}: the value of {quote_text(match[1])} is a text, and not the object in it. Make the "
-                    "object with ast.literal_eval(...) first"
+                yield Sentence(
+                    "%(place)s: the value of %(key)s is a text, and not the object in it. Make the object with "
+                    "ast.literal_eval(...) first",
+                    place=location,
+                    key=quote_text(match[1]),
                 )
                 return
 
@@ -247,9 +288,11 @@ def hint_about_returned_pair(clues: Clues) -> Iterator[str]:
             for statement in listing.code.statements:
                 if statement.keyword == "return" and _PAIR.match(" ".join(statement.tokens[1:])):
                     names = ", ".join(f'"{key}": ...' for key in keys)
-                    yield (
-                        f"{listing.locate(statement.line)} returns several values, without keys. Write an object with "
-                        f"the keys that are asked for: return {{{names}}}"
+                    yield Sentence(
+                        "%(place)s returns several values, without keys. Write an object with the keys that are asked "
+                        "for: return {%(entries)s}",
+                        place=listing.locate(statement.line),
+                        entries=names,
                     )
                     return
 
@@ -264,7 +307,12 @@ def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
             similar_keys = difflib.get_close_matches(key, sorted(answer_keys - expected_keys), 1, _MIN_SIMILARITY)
             line = _describe_key_line(similar_keys, clues) if similar_keys else ""
             if line:
-                yield f"{line} writes the key {quote_text(similar_keys[0])}; expected {quote_text(key)}"
+                yield Sentence(
+                    "%(place)s writes the key %(key)s; expected %(expected)s",
+                    place=line,
+                    key=quote_text(similar_keys[0]),
+                    expected=quote_text(key),
+                )
                 return
 
 

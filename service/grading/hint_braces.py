@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 
 from service.grading.hint_clues import Clues
+from sim.sentences import Sentence
 
 _BRACES = re.compile(r"\{([A-Za-z_]\w*)[^{}\"']{0,40}\}")
 _PLAIN_TEXT = re.compile(r"""[bru]?["']""", re.IGNORECASE)
@@ -33,9 +34,12 @@ def hint_about_braces(clues: Clues) -> Iterator[str]:
                 braces = next((each for each, name in names_by_braces.items() if each in token and name in names), None)
                 if braces is None or not _PLAIN_TEXT.match(token) or "format" in statement.tokens:
                     continue
-                fixed_text = f"f{token}" if len(token) <= _MAX_TOKEN_LENGTH else "f before the first quote"
-                yield (
-                    f"{listing.locate(statement.line)}: the f before the quotes is missing, so {braces} stays as it is "
-                    f"and is not replaced by its value. Write {fixed_text}"
+                is_short = len(token) <= _MAX_TOKEN_LENGTH
+                yield Sentence(
+                    "%(place)s: the f before the quotes is missing, so %(braces)s stays as it is and is not replaced "
+                    "by its value. Write %(code)s",
+                    place=listing.locate(statement.line),
+                    braces=braces,
+                    code=f"f{token}" if is_short else Sentence("f before the first quote"),
                 )
                 return

@@ -15,6 +15,7 @@ from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
 from service.grading.hint_texts import describe_quoting_line
+from sim.sentences import Sentence, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.code import Functions
 from submissions.criteria.logs import Datalog
@@ -38,7 +39,7 @@ def hint_about_cause_line(clues: Clues) -> Iterator[str]:
             return
         location = _describe_cause_line(criterion, message, clues)
         if location:
-            yield f"{location}: {message[0].lower()}{message[1:].rstrip('.')}"
+            yield Sentence("%(place)s: %(problem)s", place=location, problem=make_clause(message))
 
 
 def _describe_cause_line(criterion: Criterion, message: str, clues: Clues) -> str:

@@ -22,6 +22,7 @@ from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERT
 from service.grading.judging.judge import JUDGES
 from service.grading.judging.judge_declaration import Case, StaticAnalysis
 from sim.recording import Pose, Recording
+from sim.sentences import Sentence, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose
@@ -89,9 +90,12 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
     for first, second, order in _collect_exchanges(listing, trials)[: min(_MAX_LINES, _MAX_TICKS // max(ticks, 1))]:
         exchanged = [replace(each, recording=_reorder_motion(each.recording, order)) for each in trials]
         if _has_full_marks(criterion, clues, exchanged):
-            yield (
-                f"{listing.locate(first.line)}: {failure[0].lower()}{failure[1:].rstrip('.')}. Lines {first.line} and "
-                f"{second.line} are in the wrong order: exchange them"
+            yield Sentence(
+                "%(place)s: %(problem)s. Lines %(line)s and %(other_line)s are in the wrong order: exchange them",
+                place=listing.locate(first.line),
+                problem=make_clause(failure),
+                line=first.line,
+                other_line=second.line,
             )
             return
 
@@ -249,13 +253,23 @@ def _describe_change(change: _Change, factor: float, failure: str) -> str:
     name = change.call.name.rpartition(".")[2] if change.call is not None else ""
     amount = numbers[-1] if numbers and (len(numbers) == 1 or name in LIMITED_MOVES | {"sleep"}) else None
     if factor < 0:
-        fix = "Let the robot move the other way here: change the sign of the speed or steering"
+        fix: str = Sentence("Let the robot move the other way here: change the sign of the speed or steering")
     elif amount:
-        fix = f"Change {amount:g} to about {format_rounded(amount * factor)}"
+        fix = suggest_number(amount, amount * factor)
+    elif factor > 1:
+        fix = Sentence(
+            "Let the robot move about %(factor).2g times as far or turn as much here, more than now", factor=factor
+        )
     else:
-        comparison = "more" if factor > 1 else "less"
-        fix = f"Let the robot move about {factor:.2g} times as far or turn as much here, {comparison} than now"
-    return f"{location}: {failure[0].lower()}{failure[1:].rstrip('.')}. {fix}"
+        fix = Sentence(
+            "Let the robot move about %(factor).2g times as far or turn as much here, less than now", factor=factor
+        )
+    return Sentence("%(place)s: %(problem)s. %(advice)s", place=location, problem=make_clause(failure), advice=fix)
+
+
+def suggest_number(present: float, better: float) -> str:
+    """Return advice to change a number to about a better one."""
+    return Sentence("Change %(present)g to about %(better)s", present=present, better=format_rounded(better))
 
 
 def format_rounded(number: float) -> str:

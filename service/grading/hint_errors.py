@@ -1,6 +1,6 @@
 """Hints on errors: the first error of each trial and of a notebook's cells, with advice.
 
-The advice comes from the table in ``hint_tables.py``, or from the submission if the table is not enough.
+The advice comes from the table in ``hint_error_advice.py``, or from the submission if the table is not enough.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import PurePosixPath
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import Statement, join_tokens
+from service.grading.hint_error_advice import ADVICE
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
 from service.grading.hint_names import (
     PRELOADED,
@@ -41,10 +42,12 @@ from service.grading.hint_operands import (
 )
 from service.grading.hint_skipped_loops import describe_skipped_loops
 from service.grading.hint_syntax import advise_on_syntax
-from service.grading.hint_tables import ADVICE, PROPERTIES, UNAVAILABLE_MODULES, USAGE
+from service.grading.hint_tables import PROPERTIES, UNAVAILABLE_MODULES, USAGE
 from service.grading.judging.message_parts import quote_text
+from service.language import translatable
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
+from sim.sentences import Sentence, join_sentences
 from submissions.raw_files import sanitise_name
 
 _NON_ERROR_VERDICTS = (Verdict.TIME_LIMIT, Verdict.CPU_LIMIT, Verdict.HOST_ERROR, Verdict.ASSIGNMENT_ERROR)
@@ -54,9 +57,16 @@ _LIBRARIES = ("joblib", "numpy", "pandas", "sklearn")
 _LABELS = re.compile(r"label|target|\by\b|y_train", re.IGNORECASE)
 #: Reasons why a message was lost for good. Waiting does not help.
 _OUT_OF_REACH = {
-    "out of range": "was out of range. Drive nearer before you send",
-    "facing away": "faced away. Turn to the receiver before you send",
-    "blocked": "was behind an obstacle. Drive around it before you send",
+    "out of range": translatable(
+        "No answer came: %(message)s was lost, because the robot was out of range. Drive nearer before you send."
+    ),
+    "facing away": translatable(
+        "No answer came: %(message)s was lost, because the robot faced away. Turn to the receiver before you send."
+    ),
+    "blocked": translatable(
+        "No answer came: %(message)s was lost, because the robot was behind an obstacle. Drive around it before you "
+        "send."
+    ),
 }
 _TEXT = re.compile(r"""(["'])((?:(?!\1).){1,200})\1""")
 #: Long values in error messages, which are removed.
@@ -100,12 +110,14 @@ def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
         return
     values = read_values(fault, FaultKind.UNDEFINED_NAME)
     if values and fault.who == "program" and clues.preamble != "preloaded" and values[0] in PRELOADED:
-        yield (
-            f"{location} uses {values[0]}, which %%sim_magic_preloaded brings; expected that magic in the first line, "
-            "or the name to be defined"
+        yield Sentence(
+            "%(place)s uses %(name)s, which %%%%sim_magic_preloaded brings; expected that magic in the first line, or "
+            "the name to be defined",
+            place=location,
+            name=values[0],
         )
         return
-    yield f"{location}: {describe_error(fault, clues)}"
+    yield Sentence("%(place)s: %(problem)s", place=location, problem=describe_error(fault, clues))
 
 
 def describe_error(fault: Fault, clues: Clues) -> str:
@@ -115,7 +127,9 @@ def describe_error(fault: Fault, clues: Clues) -> str:
     if not advice:
         return sentence
     sentence = _MODULES.sub("", _COMMA_GUESS.sub("", sentence))
-    return f"{sentence}{'' if sentence.endswith('?') else '.'} {advice}"
+    if sentence.endswith("?"):
+        return join_sentences(sentence, advice)
+    return Sentence("%(problem)s. %(advice)s", problem=sentence, advice=advice)
 
 
 def advise_on_error(fault: Fault, clues: Clues) -> str:
@@ -134,8 +148,11 @@ def _advise_on_null(fault: Fault, clues: Clues, *_: object) -> str:
     answer = next((text for text in clues.answers if _NULL.search(text)), None)
     if fault.who != "program" or not is_kind(fault, FaultKind.NONE_OBJECT) or answer is None:
         return ""
-    location = describe_return_line(answer, clues, RETURN_LINE)
-    return f"The responder answered {quote_text(answer)}: check why {location} is reached, and its condition."
+    return Sentence(
+        "The responder answered %(answer)s: check why %(place)s is reached, and its condition.",
+        answer=quote_text(answer),
+        place=describe_return_line(answer, clues, RETURN_LINE),
+    )
 
 
 def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
@@ -146,9 +163,11 @@ def _advise_on_lost_message(fault: Fault, clues: Clues, _: Listing | None, state
     lost_message = next((each for each in clues.messages if each.lost in _OUT_OF_REACH), None)
     if fault.who != "program" or not is_queue_empty or lost_message is None or clues.answers:
         return ""
-    reason = f"{quote_text(lost_message.text)} was lost, because the robot {_OUT_OF_REACH[lost_message.lost]}"
+    advice = Sentence(_OUT_OF_REACH[lost_message.lost], message=quote_text(lost_message.text))
     skipped_loop = next((found for found, _ in describe_skipped_loops(clues)), "") if clues.is_stationary else ""
-    return f"No answer came: {reason}.{skipped_loop and ' It never moved. In '}{skipped_loop}"
+    if not skipped_loop:
+        return advice
+    return Sentence("%(advice)s It never moved. In %(loop)s", advice=advice, loop=skipped_loop)
 
 
 def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
@@ -158,13 +177,16 @@ def _advise_on_module(fault: Fault, clues: Clues, *_: object) -> str:
         return ""
     name = values[0].partition(".")[0]
     if name in clues.agents:
-        return f"{name}.py is an agent, and agents are not imported: delete this line and call {name}(...)."
+        return Sentence(
+            "%(agent)s.py is an agent, and agents are not imported: delete this line and call %(agent)s(...).",
+            agent=name,
+        )
     if name.startswith("ev3dev2") and fault.who == "responder":
-        return f"Only a robot program can import {name}: delete this line."
+        return Sentence("Only a robot program can import %(module)s: delete this line.", module=name)
     if name in UNAVAILABLE_MODULES:
-        return f"{name} is not available here: delete this line and all lines that use it."
+        return Sentence("%(module)s is not available here: delete this line and all lines that use it.", module=name)
     similar_modules = difflib.get_close_matches(name.lower(), [*_LIBRARIES, *sys.stdlib_module_names], 1, _NEAR_MODULE)
-    return f"Did you mean {similar_modules[0]}?" if similar_modules and not fault.hint else ""
+    return Sentence("Did you mean %(name)s?", name=similar_modules[0]) if similar_modules and not fault.hint else ""
 
 
 def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -175,7 +197,7 @@ def _advise_on_message_text(fault: Fault, _: Clues, listing: Listing | None, sta
         each.has_token("loads", "literal_eval") for each in listing.code.statements
     ):
         return ""
-    return "The message is still a text: write json.loads(...) around the text after IMG_DATA:: or PY::."
+    return Sentence("The message is still a text: write json.loads(...) around the text after IMG_DATA:: or PY::.")
 
 
 def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
@@ -185,9 +207,10 @@ def _advise_on_unpacking(fault: Fault, _: Clues, __: Listing | None, statement: 
     equals_index = statement.tokens.index("=")
     value = statement.tokens[-1]
     if value == "rgb":
-        return f"rgb has three values: write red, green, blue = {join_tokens(statement.tokens[equals_index + 1 :])}."
+        code = join_tokens(statement.tokens[equals_index + 1 :])
+        return Sentence("rgb has three values: write red, green, blue = %(code)s.", code=code)
     names = sum(token == "," for token in statement.tokens[:equals_index]) + 1
-    return f"There are {names} names to the left of =: write as many names as there are values."
+    return Sentence("There are %(count)s names to the left of =: write as many names as there are values.", count=names)
 
 
 def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
@@ -202,7 +225,8 @@ def _advise_on_fit(fault: Fault, _: Clues, __: Listing | None, statement: Statem
             and _LABELS.search(arguments[0])
             and not _LABELS.search(arguments[1])
         ):
-            return f"fit takes the images first and then the labels: write {call.name}({arguments[1]}, {arguments[0]})."
+            fixed_call = f"{call.name}({arguments[1]}, {arguments[0]})"
+            return Sentence("fit takes the images first and then the labels: write %(code)s.", code=fixed_call)
     return ""
 
 
@@ -210,14 +234,14 @@ def _advise_on_labels(fault: Fault, *_: object) -> str:
     """Return advice on a network for numbers that is trained with texts as labels."""
     if not is_kind(fault, FaultKind.TEXT_LABELS):
         return ""
-    return "The labels are texts: use a classifier, such as MLPClassifier, and no regressor."
+    return Sentence("The labels are texts: use a classifier, such as MLPClassifier, and no regressor.")
 
 
 def _advise_on_steering(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on a speed given in the position of the steering."""
     calls = () if statement is None or not is_kind(fault, FaultKind.NO_SPEED) else statement.calls
     usage = next((USAGE[call.name] for call in calls if call.name.startswith("tank_turn.") and call.name in USAGE), "")
-    return f"The arguments are in the wrong order: write {usage}." if usage else ""
+    return Sentence("The arguments are in the wrong order: write %(usage)s.", usage=Sentence(usage)) if usage else ""
 
 
 def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None, _: Statement | None) -> str:
@@ -226,19 +250,23 @@ def _advise_on_missing_file(fault: Fault, clues: Clues, listing: Listing | None,
     if values:
         file = PurePosixPath(values[0].replace("\\", "/")).name
         if file in clues.files or file != values[0]:
-            return (
-                f"Files lie beside your program: submit {sanitise_name(file)} with it and write "
-                f'"{sanitise_name(file)}", no folder.'
+            return Sentence(
+                'Files lie beside your program: submit %(file)s with it and write "%(file)s", no folder.',
+                file=sanitise_name(file),
             )
         if fault.hint:
-            return f"{fault.hint} Submit {sanitise_name(file)} with your program if that is the right name."
-        return f"There is no such file. Submit {sanitise_name(file)} with your program."
+            advice = Sentence("Submit %(file)s with your program if that is the right name.", file=sanitise_name(file))
+            return join_sentences(fault.hint, advice)
+        return Sentence("There is no such file. Submit %(file)s with your program.", file=sanitise_name(file))
     if not is_kind(fault, FaultKind.NO_ACCESS) or listing is None or fault.line is None:
         return ""
     for text in _TEXT.finditer("".join(listing.lines[fault.line - 1 : fault.line])):
         if "/" in text[2] or "\\" in text[2]:
             file = PurePosixPath(text[2].replace("\\", "/")).name
-            return f'Only files beside your program can be opened: write "{sanitise_name(file)}", without folders.'
+            return Sentence(
+                'Only files beside your program can be opened: write "%(file)s", without folders.',
+                file=sanitise_name(file),
+            )
     return ""
 
 
@@ -253,11 +281,14 @@ def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
     keys = list(dict.fromkeys(key for key in (*clues.table_columns, *code_keys) if key != missing_key))[:200]
     similar_keys = difflib.get_close_matches(missing_key, keys, 1, _NEAR_KEY)
     if similar_keys:
-        return f'Did you mean "{similar_keys[0]}"?'
+        return Sentence('Did you mean "%(key)s"?', key=similar_keys[0])
     answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
     if fault.who == "program" and answer:
-        return f"Nothing is stored under this key. The responder answered {quote_text(answer)}: use one of its keys."
-    return "Nothing is stored under this key. Print the object to see its keys."
+        return Sentence(
+            "Nothing is stored under this key. The responder answered %(answer)s: use one of its keys.",
+            answer=quote_text(answer),
+        )
+    return Sentence("Nothing is stored under this key. Print the object to see its keys.")
 
 
 def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, statement: Statement | None) -> str:
@@ -267,14 +298,18 @@ def _advise_on_call(fault: Fault, clues: Clues, listing: Listing | None, stateme
     for call in statement.calls:
         name = call.name.rpartition(".")[2]
         if name in PROPERTIES and "." in call.name:
-            return f"{name} is a property: write it without brackets, {call.name}."
+            return Sentence(
+                "%(property)s is a property: write it without brackets, %(code)s.", property=name, code=call.name
+            )
         assignment = next((each for each in listing.code.statements if each.target == call.name), None)
         if assignment is not None:
-            return (
-                f"Line {assignment.line} gives {call.name} another value: {join_tokens(assignment.tokens)}. Choose "
-                "another name there."
+            return Sentence(
+                "Line %(line)s gives %(name)s another value: %(code)s. Choose another name there.",
+                line=assignment.line,
+                name=call.name,
+                code=join_tokens(assignment.tokens),
             )
-    return "A sign such as * or a comma is missing before the bracket, or the name stands for a value."
+    return Sentence("A sign such as * or a comma is missing before the bracket, or the name stands for a value.")
 
 
 def _advise_on_usage(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
@@ -284,7 +319,7 @@ def _advise_on_usage(fault: Fault, _: Clues, __: Listing | None, statement: Stat
         return ""
     call = next((each for each in statement.calls if each.name.rpartition(".")[2] == values[1]), None)
     usage = USAGE.get(call.name) if call is not None else None
-    return f"Write {usage}." if usage else ""
+    return Sentence("Write %(usage)s.", usage=Sentence(usage)) if usage else ""
 
 
 def _advise_from_hint(fault: Fault, *_: object) -> str:
@@ -296,7 +331,7 @@ def _advise_from_table(fault: Fault, _: Clues, listing: Listing | None, statemen
     code = "" if listing is None else "".join(listing.lines[(fault.line or 0) - 1 : fault.line])
     text = f"{fault.message}\n{code}"
     matches = ((error.search(text), advice) for error, advice in ADVICE)
-    return next((match.expand(advice) for match, advice in matches if match), "")
+    return next((Sentence(advice, **match.groupdict("")) for match, advice in matches if match), "")
 
 
 _Adviser = Callable[[Fault, Clues, Listing | None, Statement | None], str]

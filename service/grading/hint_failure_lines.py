@@ -12,14 +12,15 @@ from dataclasses import dataclass
 
 from service.grading.findings import ExtraText, LateResend, MissingAnswer, OtherMove, OtherSide, StillRunning
 from service.grading.grade import Evidence
-from service.grading.hint_clues import Clues, F, Listing
+from service.grading.hint_clues import Clues, F, Listing, name_cell
 from service.grading.hint_code import CallInCode, Statement, join_tokens
-from service.grading.hint_counterfactuals import format_rounded
+from service.grading.hint_counterfactuals import suggest_number
 from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
 from service.grading.judging.message_parts import quote_text
 from sim.recording import Recording
 from sim.recording_values import rebuild_floor
+from sim.sentences import Sentence, join_sentences, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.ending import EndPose
 from submissions.criteria.line import Follows, Laps
@@ -52,7 +53,7 @@ class _Failure:
 
     @property
     def message_clause(self) -> str:
-        return f"{self.found[0].lower()}{self.found[1:].rstrip('.')}"
+        return make_clause(self.found)
 
 
 def hint_about_failure_line(clues: Clues) -> Iterator[str]:
@@ -85,9 +86,11 @@ def hint_about_unentered_loop(clues: Clues) -> Iterator[str]:
         body = listing.code.list_body(statement) if statement.keyword == "while" and not statement.parent >= 0 else ()
         acting_statements = [one for one in body if any(_has_effect(call) for call in one.calls)]
         if acting_statements and not any(one.line in executed_lines for one in body):
-            yield (
-                f"{listing.locate(statement.line)}: the loop never ran, because {join_tokens(statement.condition)} was "
-                "false from the start. Check the sign of the comparison and the values in it"
+            yield Sentence(
+                "%(place)s: the loop never ran, because %(condition)s was false from the start. Check the sign of the "
+                "comparison and the values in it",
+                place=listing.locate(statement.line),
+                condition=join_tokens(statement.condition),
             )
             return
 
@@ -122,7 +125,7 @@ def _find_failure(clues: Clues, criterion: Criterion) -> _Failure | None:
 
 
 def _find_cell(programs: Sequence[Listing], number: int) -> Listing:
-    return next((each for each in programs if each.name == f"cell {number}"), programs[0])
+    return next((each for each in programs if each.name == name_cell(number)), programs[0])
 
 
 def _list_lines_before(recording: Recording, listing: Listing, evidence: Evidence) -> list[Statement]:
@@ -154,14 +157,23 @@ def _hint_about_duration(failure: _Failure) -> str:
     middle = (minimum + maximum) / 2
     amount = failure.listing.code.number(call.arguments[-1]) if call.arguments else None
     if call.name.endswith("on_for_seconds") and amount:
-        fix = f"Change {amount:g} to about {format_rounded(amount * middle / seconds)}"
+        fix = suggest_number(amount, amount * middle / seconds)
     elif call.name.endswith("on_for_seconds"):
-        fix = f"Write {middle:g} as the number of seconds"
+        fix = Sentence("Write %(seconds)g as the number of seconds", seconds=middle)
     else:
         owner, _, name = call.name.rpartition(".")
-        write = f"{owner}.on_for_seconds(..., {middle:g})"
-        fix = f"{name} turns the wheels by an amount, however long that takes. Write {write}"
-    return f"{failure.listing.locate(move_statement.line)}: {failure.message_clause}. {fix}"
+        fix = Sentence(
+            "%(function)s turns the wheels by an amount, however long that takes. Write %(code)s",
+            function=name,
+            code=f"{owner}.on_for_seconds(..., {middle:g})",
+        )
+    return _advise_in_line(failure, move_statement, fix)
+
+
+def _advise_in_line(failure: _Failure, statement: Statement, advice: str) -> str:
+    """Return a hint with the line, the failure and advice."""
+    place = failure.listing.locate(statement.line)
+    return Sentence("%(place)s: %(problem)s. %(advice)s", place=place, problem=failure.message_clause, advice=advice)
 
 
 def _hint_about_unwanted_text(failure: _Failure) -> str:
@@ -174,13 +186,26 @@ def _hint_about_unwanted_text(failure: _Failure) -> str:
         return ""
     head = next((each for each in failure.listing.code.list_enclosing(statement) if each.keyword in _BLOCK_HEADS), None)
     if head is None:
-        fix = "Remove this line, or write another text"
+        fix = Sentence("Remove this line, or write another text")
     elif head.keyword == "for":
-        fix = f"Check the values of the loop in line {head.line}: {join_tokens(head.tokens[1:]).rstrip(':')}"
+        fix = Sentence(
+            "Check the values of the loop in line %(line)s: %(code)s",
+            line=head.line,
+            code=join_tokens(head.tokens[1:]).rstrip(":"),
+        )
     else:
-        fix = f"Check the condition in line {head.line}: {join_tokens(head.condition)}. It must be false then"
-    text = quote_text(extra_text.text)
-    return f"{failure.listing.locate(statement.line)} writes {text}: {failure.message_clause}. {fix}"
+        fix = Sentence(
+            "Check the condition in line %(line)s: %(condition)s. It must be false then",
+            line=head.line,
+            condition=join_tokens(head.condition),
+        )
+    return Sentence(
+        "%(place)s writes %(text)s: %(problem)s. %(advice)s",
+        place=failure.listing.locate(statement.line),
+        text=quote_text(extra_text.text),
+        problem=failure.message_clause,
+        advice=fix,
+    )
 
 
 def _hint_about_resending(failure: _Failure) -> str:
@@ -190,21 +215,26 @@ def _hint_about_resending(failure: _Failure) -> str:
         return ""
     loop = next((each for each in failure.listing.code.list_enclosing_loops(statement) if each is not statement), None)
     if failure.find_finding(LateResend) is not None and loop is not None:
-        return (
-            f"{failure.listing.locate(statement.line)} sends the message again although its answer had come. Leave the "
-            f"loop in line {loop.line} as soon as the answer is there, for example with break below if messages:"
+        return Sentence(
+            "%(place)s sends the message again although its answer had come. Leave the loop in line %(line)s as soon "
+            "as the answer is there, for example with break below if messages:",
+            place=failure.listing.locate(statement.line),
+            line=loop.line,
         )
     if failure.find_finding(MissingAnswer) is None:
         return ""
     if loop is None:
-        return (
-            f"{failure.listing.locate(statement.line)} sends the message once: {failure.message_clause}. Repeat it in "
-            "a while loop"
+        return Sentence(
+            "%(place)s sends the message once: %(problem)s. Repeat it in a while loop",
+            place=failure.listing.locate(statement.line),
+            problem=failure.message_clause,
         )
     loop_head = join_tokens(loop.condition) if loop.keyword == "while" else join_tokens(loop.tokens[1:]).rstrip(":")
-    return (
-        f"{failure.listing.locate(loop.line)}: the loop ended, or went on to the next message, before an answer had "
-        f"come. Check {loop_head}: it must send the message again until the answer is there"
+    return Sentence(
+        "%(place)s: the loop ended, or went on to the next message, before an answer had come. Check %(code)s: it must "
+        "send the message again until the answer is there",
+        place=failure.listing.locate(loop.line),
+        code=loop_head,
     )
 
 
@@ -223,9 +253,12 @@ def _hint_about_other_sensor(failure: _Failure) -> str:
     )
     if not required_property or statement is None or is_mixed:
         return ""
-    return (
-        f"{failure.listing.locate(statement.line)} reads {other_property}, but {required_property} is judged: "
-        f"{failure.message_clause}. Write {required_property}"
+    return Sentence(
+        "%(place)s reads %(other)s, but %(required)s is judged: %(problem)s. Write %(required)s",
+        place=failure.listing.locate(statement.line),
+        other=other_property,
+        required=required_property,
+        problem=failure.message_clause,
     )
 
 
@@ -236,9 +269,11 @@ def _hint_about_crossing(failure: _Failure) -> str:
         return ""
     if not any(each.has_token(*PROPERTIES) for each in failure.listing.code.statements):
         return ""
-    return (
-        f"{failure.listing.locate(statement.line)} turns the robot to the other side: {failure.message_clause}. "
-        "Exchange the values for the left and the right motor"
+    return Sentence(
+        "%(place)s turns the robot to the other side: %(problem)s. Exchange the values for the left and the right "
+        "motor",
+        place=failure.listing.locate(statement.line),
+        problem=failure.message_clause,
     )
 
 
@@ -255,28 +290,29 @@ def _hint_about_loop_end(failure: _Failure) -> str:
     last_reading, required_reading = _describe_readings(failure)
     body = code.list_body(loop)
     if failure.find_finding(StillRunning) is not None:
-        condition_advice = (
-            f" At the required place, the sensor reads {required_reading}, and the condition must be false"
-            if required_reading
-            else ""
+        did_not_end = Sentence("The loop did not end, because %(condition)s stayed true.", condition=condition)
+        if required_reading:
+            fix = Sentence(
+                "At the required place, the sensor reads %(reading)s, and the condition must be false",
+                reading=required_reading,
+            )
+        else:
+            fix = Sentence("Choose a condition that becomes false at the required place")
+        return _advise_in_line(failure, loop, join_sentences(did_not_end, fix))
+    loop_end = Sentence("The loop ends as soon as %(condition)s is false.", condition=condition)
+    if any(each.keyword == "break" for each in body):
+        loop_end = Sentence("The loop ends.")
+    readings: str = ""
+    if last_reading and required_reading:
+        readings = Sentence(
+            "The sensor read %(reading)s; at the required place it reads %(required)s.",
+            reading=last_reading,
+            required=required_reading,
         )
-        return (
-            f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop did not end, because {condition} "
-            f"stayed true.{condition_advice or ' Choose a condition that becomes false at the required place'}"
-        )
-    end_clause = "" if any(each.keyword == "break" for each in body) else f" as soon as {condition} is false"
-    reading_sentence = f" The sensor read {last_reading}" if last_reading else ""
-    reading_sentence += (
-        f"; at the required place it reads {required_reading}."
-        if last_reading and required_reading
-        else "."
-        if last_reading
-        else ""
-    )
-    return (
-        f"{failure.listing.locate(loop.line)}: {failure.message_clause}. The loop ends{end_clause}.{reading_sentence} "
-        "Change the condition so that it is true until the robot reaches this place"
-    )
+    elif last_reading:
+        readings = Sentence("The sensor read %(reading)s.", reading=last_reading)
+    fix = Sentence("Change the condition so that it is true until the robot reaches this place")
+    return _advise_in_line(failure, loop, join_sentences(loop_end, readings, fix))
 
 
 def _find_sensor_loop(listing: Listing, statement: Statement) -> Statement | None:
@@ -303,7 +339,7 @@ def _describe_required_reading(criterion: StopOn, recording: Recording) -> str:
         return _format_colour(criterion.rgb)
     if criterion.reflected is not None:
         minimum, maximum = criterion.reflected
-        return f"{minimum:g} to {maximum:g} %"
+        return Sentence("%(least)g to %(most)g %%", least=minimum, most=maximum)
     position = criterion.near
     if criterion.zone is not None:
         left, bottom, right, top = criterion.zone
@@ -332,10 +368,11 @@ def _hint_about_steering(failure: _Failure) -> str:
     steering_pair = next(((each, call) for each in failure.lines for call in each.calls if _is_steering(call)), None)
     if steering_pair is None:
         return ""
-    return (
-        f"{failure.listing.locate(steering_pair[0].line)} steers: {failure.message_clause}. If the robot turns too "
-        "little, multiply the "
-        "difference by a larger number or drive slower; if it turns away from the line, change the sign of the steering"
+    return Sentence(
+        "%(place)s steers: %(problem)s. If the robot turns too little, multiply the difference by a larger number or "
+        "drive slower; if it turns away from the line, change the sign of the steering",
+        place=failure.listing.locate(steering_pair[0].line),
+        problem=failure.message_clause,
     )
 
 

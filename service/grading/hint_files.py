@@ -9,10 +9,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 
-from service.grading.hint_clues import Clues, Listing
+from service.grading.hint_clues import Clues, Listing, name_cell
 from service.grading.hint_code import Statement
 from service.grading.hint_structure import DRIVING_CRITERIA, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES
+from service.language import translatable
+from sim.sentences import Sentence
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.criteria.code import SourceRules
 from submissions.criteria.drawing import Drawing
@@ -48,11 +50,18 @@ def hint_about_starter_files(clues: Clues) -> Iterator[str]:
         next(iter(starter_files.items())),
     )
     line = _find_todo_line(text)
-    sentence = f"{name} is the starter as it was given, and has nothing of your own yet"
     if line:
-        yield f"line {line} of {name}: {sentence}. Begin here: {text[line - 1].strip(' #')}"
+        yield Sentence(
+            "%(place)s: %(file)s is the starter as it was given, and has nothing of your own yet. Begin here: %(code)s",
+            place=parts_by_name[name].locate(line),
+            file=name,
+            code=text[line - 1].strip(" #"),
+        )
     else:
-        yield f"{sentence}. Add your own lines to it"
+        yield Sentence(
+            "%(file)s is the starter as it was given, and has nothing of your own yet. Add your own lines to it",
+            file=name,
+        )
 
 
 def _find_todo_line(lines: Sequence[str]) -> int:
@@ -80,9 +89,10 @@ def hint_about_swapped_parts(clues: Clues) -> Iterator[str]:
         return
     is_swapped = program.find_line(_RESPONDER) and responder.find_line(_ROBOT)
     if is_swapped and not program.find_line(_ROBOT) and not responder.find_line(_RESPONDER):
-        yield (
-            f"{program.name} has the responder, and {responder.name} has the robot program. "
-            "Swap the names of the two files"
+        yield Sentence(
+            "%(program)s has the responder, and %(responder)s has the robot program. Swap the names of the two files",
+            program=program.name,
+            responder=responder.name,
         )
 
 
@@ -94,22 +104,32 @@ def hint_about_ignored_magic(clues: Clues) -> Iterator[str]:
         return
     for listing in clues.programs:
         magic_index = listing.magic_place
-        if magic_index is not None and (clues.marked_cell is None or listing.name == f"cell {clues.marked_cell}"):
+        if magic_index is not None and (clues.marked_cell is None or listing.name == name_cell(clues.marked_cell)):
             reason = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
             cut_match = _CUT_VALUE.search(f"{reason}\n{listing.lines[magic_index]}")
             if cut_match is not None:
-                fix = f"The value of {cut_match[2]} has no blank: write {cut_match[2]} {cut_match[3]}_{cut_match[1]}"
+                fix = Sentence(
+                    "The value of %(flag)s has no blank: write %(flag)s %(value)s",
+                    flag=cut_match[2],
+                    value=f"{cut_match[3]}_{cut_match[1]}",
+                )
             elif (joined_match := _JOINED_FLAGS.search(listing.lines[magic_index])) is not None:
-                joined_flags = joined_match[0].replace("-", "")
-                fix = f"Write one - before the letters, -{joined_flags}, or a blank before each -"
+                fix = Sentence(
+                    "Write one - before the letters, -%(flags)s, or a blank before each -",
+                    flags=joined_match[0].replace("-", ""),
+                )
             elif needs_pen:
-                fix = "Write -p to put the pen down, and check the other flags"
+                fix = Sentence("Write -p to put the pen down, and check the other flags")
             else:
-                fix = "Correct it, and check the other flags"
-            pen_clause = ", and the pen was never down" if needs_pen else ""
-            yield (
-                f"{listing.locate(magic_index + 1)}: {reason}, so all flags of the line are ignored{pen_clause}. {fix}"
+                fix = Sentence("Correct it, and check the other flags")
+            template = (
+                translatable(
+                    "%(place)s: %(reason)s, so all flags of the line are ignored, and the pen was never down. %(fix)s"
+                )
+                if needs_pen
+                else translatable("%(place)s: %(reason)s, so all flags of the line are ignored. %(fix)s")
             )
+            yield Sentence(template, place=listing.locate(magic_index + 1), reason=reason, fix=fix)
             return
 
 
@@ -136,16 +156,18 @@ def hint_about_several_programs(clues: Clues) -> Iterator[str]:
     """Yield a hint if a notebook has other robot cells that drive but are not graded."""
     if clues.marked_cell is None or not any(isinstance(each, DRIVING_CRITERIA) for each in clues.lost):
         return
-    marked_cell = f"cell {clues.marked_cell}"
+    marked_cell = name_cell(clues.marked_cell)
     other_programs = [
         each
         for each in clues.programs
         if each.name != marked_cell and any(_is_driving(one) for one in each.code.statements)
     ]
     if other_programs:
-        yield (
-            f"only the robot program in {marked_cell} is marked; {other_programs[-1].name} is a program by itself. "
-            f"If they belong together, put both into {marked_cell}"
+        yield Sentence(
+            "only the robot program in %(cell)s is marked; %(other_cell)s is a program by itself. If they belong "
+            "together, put both into %(cell)s",
+            cell=marked_cell,
+            other_cell=other_programs[-1].name,
         )
 
 
@@ -157,14 +179,16 @@ def _hint_about_redefinitions(process: list[Listing]) -> Iterator[str]:
                 name = statement.tokens[1]
                 if name in definitions:
                     earlier_listing, head = definitions[name]
-                    location = (
-                        f"line {head.line}"
-                        if earlier_listing is listing
-                        else f"line {head.line} of {earlier_listing.name}"
-                    )
-                    yield (
-                        f"{listing.locate(statement.line)} defines {name} again, instead of the function in "
-                        f"{location}. Delete one of the two, or give it another name"
+                    if earlier_listing is listing:
+                        other_place: str = Sentence("line %(line)s", line=head.line)
+                    else:
+                        other_place = earlier_listing.locate(head.line)
+                    yield Sentence(
+                        "%(place)s defines %(name)s again, instead of the function in %(other_place)s. Delete one of "
+                        "the two, or give it another name",
+                        place=listing.locate(statement.line),
+                        name=name,
+                        other_place=other_place,
                     )
                     return
                 definitions[name] = listing, statement

@@ -17,8 +17,10 @@ from service.grading.hint_code import join_tokens
 from service.grading.hint_loops import find_reading
 from service.grading.hint_structure import collect_statements
 from service.grading.hint_tables import READINGS
+from service.language import translatable
 from sim.recording import Recording, Verdict
 from sim.recording_values import collect_faults
+from sim.sentences import Sentence
 from submissions.criteria.code import Functions
 from submissions.criteria.line import Follows, Laps
 from submissions.criteria.reporting import Reports
@@ -45,10 +47,20 @@ def hint_about_gain(clues: Clues) -> Iterator[str]:
             factor, offset = listing.code.number((gain,)), listing.code.number((edge,))
             minimum, maximum, _ = READINGS[find_reading((light,), listing.code)]
             if factor and offset is not None and not minimum < offset / factor < maximum:
-                sign = "below" if factor * maximum <= offset else "above"
-                yield (
-                    f"{listing.locate(statement.line)}: {join_tokens(tokens[index - 2 : index + 3])} multiplies first, "
-                    f"so it is {sign} 0 for each reading. Write {gain} * ({light} - {edge})"
+                template = (
+                    translatable(
+                        "%(place)s: %(code)s multiplies first, so it is below 0 for each reading. Write %(fixed_code)s"
+                    )
+                    if factor * maximum <= offset
+                    else translatable(
+                        "%(place)s: %(code)s multiplies first, so it is above 0 for each reading. Write %(fixed_code)s"
+                    )
+                )
+                yield Sentence(
+                    template,
+                    place=listing.locate(statement.line),
+                    code=join_tokens(tokens[index - 2 : index + 3]),
+                    fixed_code=f"{gain} * ({light} - {edge})",
                 )
                 return
 
@@ -70,9 +82,12 @@ def hint_about_division(clues: Clues) -> Iterator[str]:
                     and (is_math_pi or tokens[index + 3] == "pi")
                 ):
                     circumference = f"{name} * {'math.pi' if is_math_pi else 'pi'}"
-                    yield (
-                        f"{listing.locate(statement.line)} divides by {name} only, and then multiplies by pi. "
-                        f"Put brackets around the product: / ({circumference})"
+                    yield Sentence(
+                        "%(place)s divides by %(name)s only, and then multiplies by pi. Put brackets around the "
+                        "product: / (%(product)s)",
+                        place=listing.locate(statement.line),
+                        name=name,
+                        product=circumference,
                     )
                     return
 
@@ -90,10 +105,13 @@ def hint_about_radius(clues: Clues) -> Iterator[str]:
         for listing, statement in collect_statements(clues) if is_half else ():
             pi_index = next((at for at, token in enumerate(statement.tokens[:-2]) if token == "pi"), None)
             if pi_index is not None and statement.tokens[pi_index + 1] == "*":
-                yield (
-                    f"{listing.locate(statement.line)}: the result {reported_numbers[0]} is half of "
-                    f"{missing.entry}. A wheel's circumference is pi times the diameter. If "
-                    f"{statement.tokens[pi_index + 2]} is the radius, multiply it by 2"
+                yield Sentence(
+                    "%(place)s: the result %(number)s is half of %(expected)s. A wheel's circumference is pi times the "
+                    "diameter. If %(name)s is the radius, multiply it by 2",
+                    place=listing.locate(statement.line),
+                    number=reported_numbers[0],
+                    expected=missing.entry,
+                    name=statement.tokens[pi_index + 2],
                 )
                 return
 
@@ -109,9 +127,12 @@ def hint_about_reversed_distance(clues: Clues) -> Iterator[str]:
             reading = _find_distance_reading(listing, statement.tokens[index + 1 :])
             if reading:
                 number = statement.tokens[index - 1]
-                yield (
-                    f"{listing.locate(statement.line)}: {number} - {reading} is below 0 when the distance is larger, "
-                    f"so the robot drives backwards. Write {reading} - {number}"
+                yield Sentence(
+                    "%(place)s: %(number)s - %(reading)s is below 0 when the distance is larger, so the robot drives "
+                    "backwards. Write %(reading)s - %(number)s",
+                    place=listing.locate(statement.line),
+                    number=number,
+                    reading=reading,
                 )
                 return
 
@@ -135,11 +156,23 @@ def hint_about_gyro_direction(clues: Clues) -> Iterator[str]:
                 ):
                     continue
                 if (turn_angle < 0) == sign.startswith("<"):
-                    verb, side = ("falls", "left") if turn_angle < 0 else ("grows", "right")
-                    yield (
-                        f"{listing.locate(loop.line)}: the gyro {verb} when the robot turns {side}, so the loop never "
-                        f"ends: {join_tokens(loop.condition)} stays true. Write {_swap_operands(left_operand)} in "
-                        f"place of {join_tokens(left_operand)}"
+                    template = (
+                        translatable(
+                            "%(place)s: the gyro falls when the robot turns left, so the loop never ends: "
+                            "%(condition)s stays true. Write %(fixed_code)s in place of %(code)s"
+                        )
+                        if turn_angle < 0
+                        else translatable(
+                            "%(place)s: the gyro grows when the robot turns right, so the loop never ends: "
+                            "%(condition)s stays true. Write %(fixed_code)s in place of %(code)s"
+                        )
+                    )
+                    yield Sentence(
+                        template,
+                        place=listing.locate(loop.line),
+                        condition=join_tokens(loop.condition),
+                        fixed_code=_swap_operands(left_operand),
+                        code=join_tokens(left_operand),
                     )
                     return
 

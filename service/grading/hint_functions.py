@@ -17,7 +17,9 @@ from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, guess_result_name, join_tokens
 from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_errors import describe_error
+from service.language import translatable
 from sim.recording import Fault, Verdict
+from sim.sentences import Sentence, make_clause
 from submissions.criteria.code import Functions
 from submissions.raw_files import sanitise_name
 
@@ -35,7 +37,7 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
     messages = {each.id: each.message for each in clues.results}
     for criterion in clues.costliest_criteria:
         message, wrong = messages.get(criterion.id, ""), clues.find_finding(criterion, WrongReturn)
-        if wrong is None:
+        if wrong is None or not message:
             continue
         advice = advise_on_difference(wrong.expected, wrong.returned)
         if not advice and isinstance(wrong.returned, list) and isinstance(next(iter(wrong.returned), None), list):
@@ -43,10 +45,12 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
         value_statement = _find_literal_statement(wrong.returned, clues) or _find_value_statement(wrong.function, clues)
         if value_statement is not None:
             listing, statement = value_statement
-            fix = advice or "Work this call out by hand, line by line, and compare"
-            yield (
-                f"{listing.locate(statement.line)}, {join_tokens(statement.tokens)}: "
-                f"{message[0].lower()}{message[1:].rstrip('.')}. {fix}"
+            yield Sentence(
+                "%(place)s, %(code)s: %(problem)s. %(advice)s",
+                place=listing.locate(statement.line),
+                code=join_tokens(statement.tokens),
+                problem=make_clause(message),
+                advice=advice or Sentence("Work this call out by hand, line by line, and compare"),
             )
             return
 
@@ -70,9 +74,12 @@ def hint_about_hidden_prefix(clues: Clues) -> Iterator[str]:
             if call is not None and len(call.arguments) == 1 and len(call.arguments[0]) == 1:
                 prefix = texts[0].partition("::")[0]
                 fixed = f'{call.name}({call.arguments[0][0]}.removeprefix("{prefix}::"))'
-                yield (
-                    f"{listing.locate(statement.line)} reads the whole text, which begins with {prefix}::, and fails. "
-                    f"Take the beginning off: {fixed}"
+                yield Sentence(
+                    "%(place)s reads the whole text, which begins with %(prefix)s::, and fails. Take the beginning "
+                    "off: %(code)s",
+                    place=listing.locate(statement.line),
+                    prefix=prefix,
+                    code=fixed,
                 )
                 return
 
@@ -86,10 +93,11 @@ def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
             for statement in listing.code.statements:
                 is_narrow = len(statement.tokens) > 2 and len(_COMMON_ERRORS & set(statement.tokens)) < 3
                 if statement.keyword == "except" and is_narrow and not statement.has_token("Exception"):
-                    yield (
-                        f"{listing.locate(statement.line)} catches only "
-                        f"{join_tokens(statement.tokens[1:]).rstrip(':')}. Another error, such as KeyError or "
-                        "TypeError, ends the function. Write except Exception:"
+                    yield Sentence(
+                        "%(place)s catches only %(errors)s. Another error, such as KeyError or TypeError, ends the "
+                        "function. Write except Exception:",
+                        place=listing.locate(statement.line),
+                        errors=join_tokens(statement.tokens[1:]).rstrip(":"),
                     )
                     return
 
@@ -137,21 +145,30 @@ def hint_about_functions(clues: Clues) -> Iterator[str]:
 
 def hint_about_wrong_values(criterion: Functions, message: str, clues: Clues) -> str:
     """Return a hint with the function, its call and the value. It names no line, since the return may be correct."""
-    expected = f"{message[0].lower()}{message[1:].rstrip('.')}"
+    problem = make_clause(message)
     if clues.find_finding(criterion, WrongHiddenCalls) is None:
         call = clues.find_finding(criterion, WrongReturn) or clues.find_finding(criterion, FailedCall)
-        return f"The function {criterion.function if call is None else call.function}: {expected}"
-    return (
-        f"The function {criterion.function}: {expected}. Call it yourself with other arguments: 0, the largest and the "
-        "smallest, equal ones, numbers with a fraction, and those on the borders of each rule"
+        function = criterion.function if call is None else call.function
+        return Sentence("The function %(function)s: %(problem)s", function=function, problem=problem)
+    return Sentence(
+        "The function %(function)s: %(problem)s. Call it yourself with other arguments: 0, the largest and the "
+        "smallest, equal ones, numbers with a fraction, and those on the borders of each rule",
+        function=criterion.function,
+        problem=problem,
     )
 
 
 def describe_missing_return(listing: Listing, head: Statement) -> str:
     """Return a hint that the function has no return, with the line to add."""
     result = guess_result_name(listing.code.list_body(head))
-    fix = f"Add return {result} as its last line" if result else "Add return with the result"
-    return f"{listing.locate(head.line)}: {head.tokens[1]} has no return, so it gives nothing back. {fix}"
+    template = (
+        translatable(
+            "%(place)s: %(function)s has no return, so it gives nothing back. Add return %(result)s as its last line"
+        )
+        if result
+        else translatable("%(place)s: %(function)s has no return, so it gives nothing back. Add return with the result")
+    )
+    return Sentence(template, place=listing.locate(head.line), function=head.tokens[1], result=result)
 
 
 def hint_about_missing_return(clues: Clues) -> Iterator[str]:
@@ -219,7 +236,8 @@ def _hint_about_function_error(criterion: Functions, clues: Clues) -> str:
         return ""
     # The tables give better advice than the similar name of an attribute: math.pi and not pi for math.PI.
     error = describe_error(replace(fault, hint=""), clues)
-    return "" if fault.file else f"{listing.locate(fault.line)}: {error}"
+    place = listing.locate(fault.line)
+    return "" if fault.file else Sentence("%(place)s: %(problem)s", place=place, problem=error)
 
 
 def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
@@ -235,29 +253,39 @@ def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
         listing, head = next(((one, each) for one, each in functions if each.tokens[1] in similar_names), (None, None))
         if listing is None or head is None:
             return ""
-        return f"{listing.locate(head.line)} defines {sanitise_name(head.tokens[1])}; expected a function called {name}"
+        return Sentence(
+            "%(place)s defines %(function)s; expected a function called %(expected)s",
+            place=listing.locate(head.line),
+            function=sanitise_name(head.tokens[1]),
+            expected=name,
+        )
     listing, head = function
     body = listing.code.list_body(head)
     returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
     print_statement = next((each for each in body if each.keyword == "print"), None)
     if not returns and print_statement is not None:
-        return (
-            f"{listing.locate(print_statement.line)} prints the result of {name} and does not return it. Write return "
-            "there"
+        return Sentence(
+            "%(place)s prints the result of %(function)s and does not return it. Write return there",
+            place=listing.locate(print_statement.line),
+            function=name,
         )
     wrong = clues.find_finding(criterion, WrongReturn)
     if not returns and wrong is not None and wrong.returned is None:
         return describe_missing_return(listing, head)
     early_return = find_early_return(listing, head)
     if early_return is not None:
-        return (
-            f"{listing.locate(early_return.line)}: return is in the loop, so {name} ends in the first pass of the "
-            "loop. Move return below the loop: indent it less"
+        return Sentence(
+            "%(place)s: return is in the loop, so %(function)s ends in the first pass of the loop. Move return below "
+            "the loop: indent it less",
+            place=listing.locate(early_return.line),
+            function=name,
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
     if stop is not None and wrong is not None and _is_shorter_list(wrong):
-        return (
-            f"{listing.locate(stop.line)}: break ends the whole loop, so {name} returns too few values. To skip only "
-            "this value, write continue instead of break"
+        return Sentence(
+            "%(place)s: break ends the whole loop, so %(function)s returns too few values. To skip only this value, "
+            "write continue instead of break",
+            place=listing.locate(stop.line),
+            function=name,
         )
     return ""

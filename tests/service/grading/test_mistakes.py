@@ -16,7 +16,8 @@ from _pytest.mark import ParameterSet
 from mistakes import first_screen
 from paths import DATA, ROOT
 from service.grading.hint_code import read_code
-from service.grading.hint_tables import ACTIONS, ADVICE, PROPERTIES, USAGE
+from service.grading.hint_error_advice import ADVICE
+from service.grading.hint_tables import ACTIONS, PROPERTIES, USAGE
 from service.grading.trial_runner import TrialRunner
 
 MISTAKES = tomllib.loads((DATA / "mistakes.toml").read_text("utf-8"))["mistake"]
