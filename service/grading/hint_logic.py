@@ -198,14 +198,23 @@ def hint_about_unused_parameter(clues: Clues) -> Iterator[str]:
             for parameter in _list_parameters(head):
                 if not any(each.has_token(parameter) for each in body):
                     call = next(one for one in drive_statement.calls if one.name.rpartition(".")[2] in LIMITED_MOVES)
-                    amount = join_tokens(call.arguments[-1]) if call.arguments else Sentence("the number")
+                    place = listing.locate(drive_statement.line)
+                    if not call.arguments:
+                        yield Sentence(
+                            "%(place)s: %(name)s never uses its parameter %(parameter)s, so it does the same with "
+                            "each value. Write %(parameter)s instead of the number if that is meant",
+                            place=place,
+                            name=name,
+                            parameter=parameter,
+                        )
+                        return
                     yield Sentence(
                         "%(place)s: %(name)s never uses its parameter %(parameter)s, so it does the same with "
                         "each value. Write %(parameter)s instead of %(amount)s if that is meant",
-                        place=listing.locate(drive_statement.line),
+                        place=place,
                         name=name,
                         parameter=parameter,
-                        amount=amount,
+                        amount=join_tokens(call.arguments[-1]),
                     )
                     return
 
