@@ -35,6 +35,7 @@ _ERROR_SOURCES = [
         "store/grades/comments",
         "store/grades/overrides",
         "store/people/lti",
+        "store/queue/pool_progress",
         "store/queue/test_runs",
         "store/revision",
         "version",

@@ -36,6 +36,9 @@ def grade(
         str | None, typer.Option(metavar="N|TAG", help="For a notebook: the number of the run to mark, or its tag.")
     ] = None,
     *,
+    all_trials: Annotated[
+        bool, typer.Option("--all-trials", help="Run all trials of pools, so that no marks are provisional.")
+    ] = False,
     channel: ChannelFlags,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Run submissions without a sandbox. For development only.")
@@ -46,6 +49,18 @@ def grade(
     In every format except text, several submissions form one document, including failed ones with the reason.
     """
     from service.commands.grading import grade_all
+    from service.grading.pools.drawing import PoolExtent
 
+    extent = PoolExtent.WHOLE if all_trials else PoolExtent.UNTIL_DECIDED
     format_name = "json" if is_json_output() else form
-    grade_all(submissions, assignment, report, format_name, channel.to_table(), language, run=run, unsafe=unsafe)
+    grade_all(
+        submissions,
+        assignment,
+        report,
+        format_name,
+        channel.to_table(),
+        language,
+        run=run,
+        extent=extent,
+        unsafe=unsafe,
+    )

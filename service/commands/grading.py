@@ -19,6 +19,7 @@ from service.commands.output import print_note, print_renderables
 from service.commands.sandbox_warning import warn_about_missing_sandbox
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
+from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import load_home_secret
 from service.language import load_language
@@ -45,6 +46,7 @@ def grade_all(
     language: str,
     *,
     run: str | None,
+    extent: PoolExtent,
     unsafe: bool,
 ) -> None:
     """Grade the submissions and print the results, one by one or in one document.
@@ -57,6 +59,7 @@ def grade_all(
         channel_flags: Values of the channel flags, by name.
         language: Code of the reports' language.
         run: The run to mark, for a notebook with several runs.
+        extent: How many trials of pools are run.
         unsafe: Run student code without the sandbox.
 
     Raises:
@@ -86,7 +89,11 @@ def grade_all(
                 submission, definition = read_with_assignment(path, named_definition)
                 submission = _select_run(submission, run)
                 grade = grade_submission(
-                    submission, _apply_to_scenarios(definition, channel_flags), secret=secret, runner=runner
+                    submission,
+                    _apply_to_scenarios(definition, channel_flags),
+                    secret=secret,
+                    runner=runner,
+                    extent=extent,
                 )
                 grade = replace(grade, notes=(*_describe_channel_flags(channel_flags), *grade.notes))
             except RobomarkError as error:

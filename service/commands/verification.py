@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 
 from service.commands.installation import open_installation
 from service.commands.output import create_table, print_json, print_line, print_note, print_renderables
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade as grade_submission
+from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.operations import stored_grades
 from service.operations.stored_grades import StoredGrading
@@ -47,10 +48,11 @@ def verify_grade(grade: str) -> None:
     with open_installation() as (service, actor):
         grading = stored_grades.load_grading(service, actor, grade)
     stored_grade, grading_request, secret = grading.grade, grading.request, _check_secret(grading)
-    regrade = _grade_again(grading_request, secret)
+    extent = PoolExtent.UNTIL_DECIDED if stored_grade.is_provisional else PoolExtent.WHOLE
+    regrade = _grade_again(grading_request, secret, extent)
     rows = list(zip(stored_grade.trials, regrade.trials, strict=False))
     marks = _compare_marks(stored_grade, regrade, rows, grading_request.assignment.criteria)
-    cause = _find_cause(rows, marks, regrade, grading_request, secret)
+    cause = _find_cause(rows, marks, regrade, lambda earlier: _grade_again(grading_request, secret, extent, earlier))
     has_differences = len(stored_grade.trials) != len(regrade.trials) or "differs" in (
         *marks,
         *itertools.starmap(_compare_trials, rows),
@@ -77,31 +79,33 @@ def verify_grade(grade: str) -> None:
     print_line(f"grade {grading.job_id} matches its regrade")
 
 
-def _grade_again(request: GradingRequest, secret: Secret, earlier_runs: int = 0) -> Grade:
+def _grade_again(request: GradingRequest, secret: Secret, extent: PoolExtent, earlier_runs: int = 0) -> Grade:
     """Grade every trial of the submission in fresh processes, after grading it ``earlier_runs`` times.
 
     In a new process namespace, process ids start again at 1. Only earlier processes make the ids differ.
     """
     with TrialRunner(spares=False) as runner:
-        for _ in range(earlier_runs):
-            grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
-        return grade_submission(request.submission, request.assignment, secret=secret, runner=runner)
+        *_, last_grade = (
+            grade_submission(request.submission, request.assignment, secret=secret, runner=runner, extent=extent)
+            for _ in range(earlier_runs + 1)
+        )
+        return last_grade
 
 
 def _find_cause(
-    rows: Sequence[TrialPair], marks: Sequence[str], regrade: Grade, request: GradingRequest, secret: Secret
+    rows: Sequence[TrialPair], marks: Sequence[str], regrade: Grade, grade_again: Callable[[int], Grade]
 ) -> str | None:
     """Return the cause of the differences, ``program`` or ``grader``, or None if nothing differs.
 
-    Grades the submission twice more, each time in fresh processes. If these gradings also differ, the program uses its
-    own randomness. Robomark itself is deterministic. Marks that differ where a limit cut a trial have no cause if these
-    gradings agree: the machine was slow once.
+    Grades the submission twice more, each time in fresh processes, after 0 and 1 other gradings. If these gradings also
+    differ, the program uses its own randomness. Robomark itself is deterministic. Marks that differ where a limit cut a
+    trial have no cause if these gradings agree: the machine was slow once.
     """
     trials = [number for number, row in enumerate(rows) if _compare_trials(*row) == "differs"]
     criteria = [number for number, compared in enumerate(marks) if compared != "same"]
     if not trials and not criteria:
         return None
-    repeated_grades = (_grade_again(request, secret), _grade_again(request, secret, earlier_runs=1))
+    repeated_grades = (grade_again(0), grade_again(1))
     has_differences = any(
         any(_compare_trials(regrade.trials[number], grade.trials[number]) == "differs" for number in trials)
         or any(regrade.criteria[number].marks != grade.criteria[number].marks for number in criteria)

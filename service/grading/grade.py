@@ -151,6 +151,26 @@ class WrittenComment:
 
 
 @dataclass(frozen=True, slots=True)
+class PoolValue:
+    """The value of a criterion over a pool of ``size`` trials, of which ``drawn`` were run.
+
+    ``least`` and ``most`` are the bounds of the value, from 0 to 1; equal if the value is exact. ``is_decided`` says
+    whether all values within the bounds give the same marks.
+    """
+
+    size: int
+    drawn: int
+    least: float
+    most: float
+    is_decided: bool
+
+    @property
+    def is_exact(self) -> bool:
+        """Return whether the whole pool was run."""
+        return self.drawn == self.size
+
+
+@dataclass(frozen=True, slots=True)
 class CriterionResult:
     """The result of one criterion. An excused criterion has a maximum of 0 marks."""
 
@@ -168,6 +188,7 @@ class CriterionResult:
     unjudged: str = ""  # why it could not be judged, for staff; otherwise empty
     for_staff: str = ""  # what staff should check; not shown to students
     set_by_hand: StaffAdjustment | None = None  # None if the marks are as graded
+    pool: PoolValue | None = None  # None if it is not defined over a pool
     #: By trial; None for what was judged once for all of them. Empty in a grade from the database.
     findings: Mapping[int | None, tuple[Finding, ...]] = field(default_factory=dict, compare=False, repr=False)
 
@@ -244,6 +265,11 @@ class Grade:
     def worth(self) -> Decimal:
         """The maximum total marks, with excused criteria."""
         return sum((result.worth for result in self.criteria), Decimal(0))
+
+    @property
+    def is_provisional(self) -> bool:
+        """Return whether marks depend on a pool of which not all trials were run."""
+        return any(result.pool is not None and not result.pool.is_exact for result in self.criteria)
 
     @property
     def verdict(self) -> Verdict:

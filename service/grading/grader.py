@@ -17,8 +17,10 @@ from responders.sandbox.meter import JobLimits, JobMeter
 from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, Grade, TrialResult, build_unjudged_notes
 from service.grading.hints import collect_hints
+from service.grading.judging.judge_declaration import StaticAnalysis
 from service.grading.judging.limited_judging import compute_judging_limits, judge_within_limits
 from service.grading.model_training import add_model_answers
+from service.grading.pools.drawing import PoolExtent, run_rounds
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
@@ -79,10 +81,12 @@ def grade(
     secret: Secret = PUBLIC_SECRET,
     observe: ProgressObserver | None = None,
     runner: TrialRunner | None = None,
+    extent: PoolExtent = PoolExtent.WHOLE,
 ) -> Grade:
     """Grade ``submission`` with seeds derived from ``secret``, the secret of the installation.
 
-    Without a ``runner``, one is created for this grading and closed afterwards.
+    Without a ``runner``, one is created for this grading and closed afterwards. ``extent`` says how many trials of
+    pools are run.
 
     Raises:
         UsageError: The submission has none of the parts that the assignment needs.
@@ -91,13 +95,21 @@ def grade(
     """
     if runner is None:
         with TrialRunner() as own_runner:
-            return grade(submission, assignment, secret=secret, observe=observe, runner=own_runner)
+            return grade(submission, assignment, secret=secret, observe=observe, runner=own_runner, extent=extent)
     plan = plan_run(submission, assignment, secret)
     runner.start_zygotes(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
     watch = _ProgressReporter(observe or _ignore_progress, len(trials))
     meter = JobMeter(_compute_job_limits(assignment, sum(map(_is_visible, trials))), watch.heartbeat)
-    results = _run_trials(plan, trials, runner, meter, watch)
+    results = run_rounds(
+        assignment,
+        trials,
+        extent,
+        run=lambda round_trials: _run_trials(plan, round_trials, len(trials), runner, meter, watch),
+        judge_trials=lambda judged_assignment, round_results: judge_within_limits(
+            compute_judging_limits(round_results), judged_assignment, round_results, StaticAnalysis(), meter.heartbeat
+        ),
+    )
     if assignment.training is not None:
         results = add_model_answers(results, plan, assignment.training, runner, meter)
     analysis = analyse(plan, results, runner, meter)
@@ -129,9 +141,12 @@ def grade(
 
 
 def _run_trials(
-    plan: RunPlan, trials: Sequence[Trial], runner: TrialRunner, meter: JobMeter, watch: _ProgressReporter
+    plan: RunPlan, trials: Sequence[Trial], total: int, runner: TrialRunner, meter: JobMeter, watch: _ProgressReporter
 ) -> list[TrialResult]:
-    """Run the trials and return the results in the order of ``trials``, which may differ from the order of the runs."""
+    """Run the trials and return the results in the order of ``trials``, which may differ from the order of the runs.
+
+    ``total`` is the number of trials of the assignment, on which the limits depend.
+    """
     if not all(map(_is_visible, trials)):
         runner.check_trial_isolation()
     results_by_number: dict[int, TrialResult] = {}
@@ -140,7 +155,7 @@ def _run_trials(
         trial = trials[number]
         if not _is_visible(trial):
             # Visible trials run within their own limit, so that it does not reveal the number of hidden trials.
-            meter.extend(_compute_job_limits(plan.assignment, len(trials)))
+            meter.extend(_compute_job_limits(plan.assignment, total))
         results_by_number[number] = TrialResult(
             trial.scenario.id,
             trial.index,

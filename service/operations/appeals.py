@@ -9,12 +9,16 @@ from sqlalchemy.orm import Session
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import load_names_for_actor, require_course, require_own_submission
+from service.store import audit
 from service.store.courses import open_assignments
-from service.store.engine import retry_conflicts
+from service.store.engine import now, retry_conflicts
 from service.store.grades import appeals
 from service.store.grades.appeals import MAX_TEXT_LENGTH, AppealLine
-from service.store.states import Role
+from service.store.queue import pool_progress
+from service.store.queue.pool_progress import PoolProgress
+from service.store.states import JobQueue, Role
 from service.store.tables.submissions import SubmissionRow
+from sim.errors import UsageError
 
 __all__ = ["MAX_TEXT_LENGTH"]
 
@@ -29,6 +33,7 @@ class OwnAppeals:
     attempt: int
     appeals: list[AppealLine]
     may_appeal: bool
+    pool: PoolProgress | None  # None if the marks depend on no pool, or are not visible
 
 
 def list_open(
@@ -78,13 +83,19 @@ def show_own(service: Service, actor: Actor, course_id: int, submission_id: int)
     """Return the appeals of a submission of the actor, with their permission to appeal now. Raises NotFound."""
     with service.store.reading() as session:
         row = _require_student_submission(session, actor, course_id, submission_id)
+        is_visible = appeals.can_appeal(session, submission_id)
         earlier_appeals = appeals.load_appeals(session, submission_id)
-        can_appeal = appeals.can_appeal(session, submission_id) and all(
-            each.answered_at is not None for each in earlier_appeals
-        )
+        can_appeal = is_visible and all(each.answered_at is not None for each in earlier_appeals)
+        pool = pool_progress.load_progress(session, submission_id) if is_visible else None
         titles = {each.assignment: each.title for each in open_assignments.list_assignments(session, course_id)}
     return OwnAppeals(
-        row.id, row.assignment, titles.get(row.assignment, row.assignment), row.attempt, earlier_appeals, can_appeal
+        row.id,
+        row.assignment,
+        titles.get(row.assignment, row.assignment),
+        row.attempt,
+        earlier_appeals,
+        can_appeal,
+        pool,
     )
 
 
@@ -98,6 +109,25 @@ def submit(service: Service, actor: Actor, course_id: int, submission_id: int, t
     with service.store.transaction() as session:
         _require_student_submission(session, actor, course_id, submission_id)
         appeals.open_appeal(session, submission_id, text)
+
+
+def run_all_trials(service: Service, actor: Actor, course_id: int, submission_id: int) -> None:
+    """Run all trials of the pools of a submission of the actor now, so that its provisional marks become exact.
+
+    Raises NotFound. Raises UsageError if the marks are exact or not visible, or the actor waits for another such run.
+    """
+    _expedite(service, actor, course_id, submission_id)
+    service.notifier.grade(JobQueue.INTERACTIVE)
+
+
+@retry_conflicts
+def _expedite(service: Service, actor: Actor, course_id: int, submission_id: int) -> None:
+    with service.store.transaction() as session:
+        row = _require_student_submission(session, actor, course_id, submission_id)
+        if not appeals.can_appeal(session, submission_id):
+            raise UsageError("you can appeal after your grade is visible")
+        pool_progress.expedite(session, submission_id, row.enrolment_id, service.settings.max_attempts, now(session))
+        audit.record_action(session, actor.name, "run all trials", "submission", str(submission_id))
 
 
 def _require_student_submission(session: Session, actor: Actor, course_id: int, submission_id: int) -> SubmissionRow:

@@ -75,34 +75,34 @@ def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) 
 
 @retry_conflicts
 def publish(
-    service: Service, actor: Actor, course_id: int, batch_id: str, *, includes_unjudged: bool = False
+    service: Service, actor: Actor, course_id: int, batch_id: str, *, includes_held_back: bool = False
 ) -> PublicationCounts:
     """Publish the newest grades of a batch, which become the standing grades.
 
-    ``includes_unjudged`` includes grades with unjudged criteria. Raises NotFound.
+    ``includes_held_back`` includes grades with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
         publication_counts = publishing.publish_batch(
-            session, batch_id, actor=actor.name, includes_unjudged=includes_unjudged
+            session, batch_id, actor=actor.name, includes_held_back=includes_held_back
         )
         return _record_publication(session, actor, course_id, "batch", batch_id, publication_counts)
 
 
 @retry_conflicts
 def publish_one(
-    service: Service, actor: Actor, course_id: int, job_id: str, *, includes_unjudged: bool = False
+    service: Service, actor: Actor, course_id: int, job_id: str, *, includes_held_back: bool = False
 ) -> PublicationCounts:
     """Publish the newest grade of one submission, which becomes its standing grade.
 
-    ``includes_unjudged`` permits a grade with unjudged criteria. Raises NotFound.
+    ``includes_held_back`` permits a grade with unjudged criteria. Raises NotFound.
     """
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_job(session, course_id, job_id)
         publication_counts = publishing.publish_grade(
-            session, job_id, actor=actor.name, includes_unjudged=includes_unjudged
+            session, job_id, actor=actor.name, includes_held_back=includes_held_back
         )
         return _record_publication(session, actor, course_id, "job", job_id, publication_counts)
 

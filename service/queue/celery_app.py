@@ -14,7 +14,7 @@ from service.store.states import JobQueue
 TEST_RUNS = "tryouts"
 PLOTS = "plots"
 #: In order of priority for a worker. Students wait for test runs, whose number is limited.
-QUEUES = (JobQueue.INTERACTIVE.value, TEST_RUNS, JobQueue.BATCH.value, PLOTS)
+QUEUES = (JobQueue.INTERACTIVE.value, TEST_RUNS, JobQueue.BATCH.value, PLOTS, JobQueue.COMPLETION.value)
 GRADE_TASK = "robomark.grade"
 TEST_RUN_TASK = "robomark.try"
 PLOT_TASK = "robomark.plot"

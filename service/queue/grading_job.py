@@ -16,6 +16,7 @@ from sqlalchemy.exc import DBAPIError
 
 from service.grading.grade import Grade
 from service.grading.grader import GradingProgress, grade
+from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.plotting import draw_plots
 from service.queue.lease_keeper import LeaseKeeper
@@ -24,7 +25,7 @@ from service.store.batches import stored_requests
 from service.store.engine import Store
 from service.store.grades import plots, results
 from service.store.installation import load_secret
-from service.store.queue import jobs
+from service.store.queue import jobs, pool_completions
 from sim.errors import Cancelled, HostError, UsageError
 from sim.recording import Verdict
 from sim.recording_values import collect_faults
@@ -92,6 +93,7 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
     progress = _Progress(claim)
     with store.reading() as session:
         grading_request = stored_requests.load_grading_request(session, claim.job_id)
+        runs_whole_pools = pool_completions.is_completion(session, claim.job_id)
     short_wait_store = store.with_short_wait()
     with LeaseKeeper(
         lambda: jobs.renew_lease(short_wait_store, claim, settings.lease_seconds, progress.share),
@@ -109,6 +111,7 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
             secret=load_secret(store),
             observe=observe,
             runner=runner,
+            extent=PoolExtent.WHOLE if runs_whole_pools else PoolExtent.UNTIL_DECIDED,
         )
         # Marks made after the time limit may lack interrupted trials.
         keeper.check()

@@ -31,10 +31,11 @@ class CredentialKind(StrEnum):
 
 
 class JobQueue(StrEnum):
-    """The queue of a job: interactive for a person who waits, or batch."""
+    """The queue of a job: interactive for a person who waits, batch, or completion of pools when nothing else waits."""
 
     INTERACTIVE = "interactive"
     BATCH = "batch"
+    COMPLETION = "completion"
 
 
 class JobState(StrEnum):

@@ -87,5 +87,6 @@ def _count_trials(scenario: Mapping[str, Any]) -> int:
     sweep_levels = sum(map(len, scenario.get("sweep", {}).values())) or 1
     noises = [scenario.get(name, 0) for name in ("light_noise", "motor_noise")]
     light_levels, motor_levels = (len(levels) if isinstance(levels, list) else 1 for levels in noises)
-    trials: int = poses * sweep_levels * light_levels * motor_levels * scenario.get("trials", 1)
+    repetitions = scenario.get("pool") or scenario.get("trials", 1)
+    trials: int = poses * sweep_levels * light_levels * motor_levels * repetitions
     return trials

@@ -33,6 +33,7 @@ from submissions.assignment.criterion_parts import check_given_files, read_check
 from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.limits import Limits
 from submissions.assignment.other_parts import SAME, build_second_poses, check_robots, read_agents
+from submissions.assignment.pools import read_draw
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import Problems, check_table, check_unique_id, filter_texts, read_tables
 from submissions.assignment.schema import (
@@ -250,12 +251,13 @@ def _build_scenario(
     if not poses:
         poses = (ground.default_pose if ground else Pose(100, 800, 0),)
     second_poses = build_second_poses(table, len(poses), table_path, problems)
+    draw = read_draw(table, len(poses), table_path, problems)
     return Scenario(
         id=table.id,
         poses=poses,
         title=table.title,
         choose=table.choose,
-        trials=table.trials,
+        trials=table.pool or (table.trials if isinstance(table.trials, int) else 1),
         seconds=table.seconds,
         light_noise=table.light_noise,
         motor_noise=table.motor_noise,
@@ -264,6 +266,7 @@ def _build_scenario(
         start_jitter=table.start_jitter,
         sweep=Sweep(**table.sweep.model_dump()),
         second_poses=second_poses,
+        draw=draw,
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from sim.errors import UsageError
+from submissions.assignment.pools import find_pool_mistakes
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import (
     Problems,
@@ -57,6 +58,7 @@ def read_criteria(
         for requirement in (
             *_find_missing_parts(criterion, context, is_robotless),
             *criterion.find_unmet_requirements(context),
+            *find_pool_mistakes(criterion, context),
         ):
             problems.add((*table_path, requirement.key), requirement.sentence)
     return tuple(criteria.values())

@@ -109,8 +109,20 @@ class Assignment:
         """The number of trials, computed without creating them."""
         return sum(scenario.trial_count for scenario in self.scenarios)
 
+    @property
+    def chance_criteria(self) -> tuple[AnyCriterion, ...]:
+        """The criteria that are defined over a pool."""
+        return tuple(criterion for criterion in self.criteria if self.find_pool(criterion) is not None)
+
+    def find_pool(self, criterion: AnyCriterion) -> Scenario | None:
+        """Return the scenario whose pool the criterion is defined over; None if there is none."""
+        if not criterion.judges_runs:
+            return None
+        scenarios = (each for each in self.scenarios if not criterion.scenarios or each.id in criterion.scenarios)
+        return next((each for each in scenarios if each.draw is not None), None)
+
     def trials(self, secret: Secret = PUBLIC_SECRET) -> Iterator[Trial]:
-        """Return all trials for the installation with this secret, in a fixed order."""
+        """Return all trials for the installation with this secret, in a fixed order; those of a pool as drawn."""
         for scenario in self.scenarios:
             levels = list(
                 itertools.product(
@@ -120,8 +132,9 @@ class Assignment:
                     scenario.motor_noise,
                 )
             )
-            repeated_levels = (level for level in levels for _ in range(scenario.trials))
-            for index, (fixed_index, sweep, light_noise, motor_noise) in enumerate(repeated_levels):
+            repeated_levels = [level for level in levels for _ in range(scenario.trials)]
+            for index in self._order_trials(scenario, len(repeated_levels), secret):
+                fixed_index, sweep, light_noise, motor_noise = repeated_levels[index]
                 seed = self.seed(scenario, index, secret)
                 pose_index = (
                     RandomStream(seed, "start pose").integer(0) % len(scenario.poses)
@@ -147,6 +160,16 @@ class Assignment:
                     if scenario.second_poses
                     else None,
                 )
+
+    def _order_trials(self, scenario: Scenario, count: int, secret: Secret) -> Sequence[int]:
+        """Return the numbers of the scenario's trials in the order in which a grading runs them.
+
+        The order of a pool depends on the secret and is the same for all students.
+        """
+        if scenario.draw is None:
+            return range(count)
+        chance = RandomStream(self.seed(scenario, 0, secret), "order of the pool")
+        return sorted(range(count), key=chance.integer)
 
     def _order_poses(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
         """Return the pose numbers in the order of the trials; None if each trial draws its own."""

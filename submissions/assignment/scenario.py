@@ -15,12 +15,22 @@ Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
 
 @dataclass(frozen=True, slots=True)
+class Draw:
+    """The numbers of trials that are drawn from a pool: at least, and at most before the whole pool is run."""
+
+    least: int = 4
+    most: int = 40
+
+
+@dataclass(frozen=True, slots=True)
 class Scenario:
     """Conditions of trials: poses x swept levels x noise levels x seeds.
 
     A second robot starts from the second pose with the same number. ``choose = "random"`` draws one pose per trial,
     from the trial's seed. ``"shuffled"`` uses each pose once, in an order from the scenario's seed. ``start_jitter`` is
     the maximum random change of each start pose in x and y (mm) and heading (degrees), drawn from the trial's seed.
+
+    With ``draw``, the trials are a pool: criteria are defined over all of them, and a grading may run only the first.
     """
 
     id: str
@@ -36,6 +46,7 @@ class Scenario:
     start_jitter: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sweep: Sweep = NO_SWEEP
     second_poses: tuple[Pose, ...] = ()  # one per pose, or none
+    draw: Draw | None = None
 
     @property
     def trial_count(self) -> int:

@@ -149,6 +149,13 @@ class SweepTable(StrictTable):
         return tuple(sorted(_check_range(value, condition.most, condition.least)))
 
 
+class DrawTable(StrictTable):
+    """The numbers of trials that are drawn from a pool: at least, and at most before the value is exact."""
+
+    least: int = Field(default=4, ge=1, le=1000)
+    most: int = Field(default=40, ge=1, le=1000)
+
+
 class ScenarioTable(StrictTable):
     """Start poses, conditions and number of trials."""
 
@@ -159,7 +166,8 @@ class ScenarioTable(StrictTable):
     )
     second_poses: tuple[Annotated[tuple[float, float, float], Entries("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
-    trials: int = Field(default=1, ge=1, le=1000)
+    pool: int | None = Field(default=None, ge=2, le=1000)  # the number of trials over which criteria are defined
+    trials: Annotated[int, Field(ge=1, le=1000)] | DrawTable = 1
     seconds: float = Field(default=60.0, gt=0, le=3600)
     light_noise: Levels = Field(default=(0.0,), min_length=1)
     motor_noise: Levels = Field(default=(0.0,), min_length=1)

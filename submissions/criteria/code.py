@@ -227,6 +227,7 @@ class PythonCheck(Criterion):
 
     check: Literal["python"]
     measures: ClassVar[Texts] = ("...",)
+    judges_each_trial: ClassVar[bool] = False
     file: Annotated[str, HOLDS_ANSWERS] = Field(pattern=r"^[\w.-]+\.py$", max_length=100)
 
     @property

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from sim.errors import UsageError
 from sim.floors import Floor
 from submissions.assignment.scenario import Scenario
-from submissions.strict_table import StrictTable
+from submissions.strict_table import Entries, StrictTable
 
 
 def as_tuple(value: object) -> object:
@@ -93,7 +93,11 @@ class Criterion(StrictTable):
     #: how trials are converted to marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
+    #: [share, marks]: the marks from a share of the pool on, for a scenario with a pool
+    bands: tuple[Annotated[tuple[float, float], Entries("[share, marks]")], ...] = ()
 
+    #: True if it judges each trial by itself and combines the trials by ``over``.
+    judges_each_trial: ClassVar[bool] = True
     #: True if it judges runs of the robot, False if it judges only code.
     judges_runs: ClassVar[bool] = True
     #: Names of the values it measures in a trial. # matches a number from 1, ... matches any words.

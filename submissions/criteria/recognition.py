@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -59,6 +59,7 @@ class Recognition(Criterion):
     images has one wrong answer, so that sending nothing is no advantage.
     """
 
+    judges_each_trial: ClassVar[bool] = False
     truth: Annotated[Literal["label", "grey", "places"] | tuple[str, ...], NOT_EMPTY] = "label"
     greys: Literal["shapes", "digits"] | dict[str, Grey] = Field(default_factory=dict)
     places: Annotated[str | tuple[LabelledPlace, ...], HOLDS_ANSWERS] = ()

@@ -59,17 +59,21 @@ def retry(store: Store, batch_id: str | None, actor: str = "staff") -> RetryCoun
     return batches.retry_dead(service_on(store), machine(actor), batch_id)
 
 
-def publish(store: Store, batch_id: str, actor: str = "staff", *, includes_unjudged: bool = False) -> PublicationCounts:
+def publish(
+    store: Store, batch_id: str, actor: str = "staff", *, includes_held_back: bool = False
+) -> PublicationCounts:
     course_id = _course(store, batch_id)
-    return regrades.publish(service_on(store), machine(actor), course_id, batch_id, includes_unjudged=includes_unjudged)
+    return regrades.publish(
+        service_on(store), machine(actor), course_id, batch_id, includes_held_back=includes_held_back
+    )
 
 
 def publish_one(
-    store: Store, job_id: str, actor: str = "staff", *, includes_unjudged: bool = False
+    store: Store, job_id: str, actor: str = "staff", *, includes_held_back: bool = False
 ) -> PublicationCounts:
     course_id = _course_of_job(store, job_id)
     return regrades.publish_one(
-        service_on(store), machine(actor), course_id, job_id, includes_unjudged=includes_unjudged
+        service_on(store), machine(actor), course_id, job_id, includes_held_back=includes_held_back
     )
 
 

@@ -78,7 +78,7 @@ def publish(
     with open_installation() as (service, actor):
         stored_batch = batches.find(service, actor, batch)
         publication = operations.publish(
-            service, actor, stored_batch.course_id, stored_batch.id, includes_unjudged=anyway
+            service, actor, stored_batch.course_id, stored_batch.id, includes_held_back=anyway
         )
     print_json(batch=stored_batch.id, published=publication)
     _print_published(f"batch {stored_batch.id}", publication)
@@ -97,7 +97,7 @@ def publish_one(
     with open_installation() as (service, actor):
         stored_grade = batches.find_grade(service, actor, grade)
         publication = operations.publish_one(
-            service, actor, stored_grade.course_id, stored_grade.id, includes_unjudged=anyway
+            service, actor, stored_grade.course_id, stored_grade.id, includes_held_back=anyway
         )
     print_json(grade=stored_grade.id, published=publication)
     _print_published(f"grade {stored_grade.id}", publication)

@@ -15,6 +15,8 @@ from service.grading.grade import CriterionResult, Evidence, TrialResult, Visibl
 from service.grading.judging.message_parts import add_hidden_note, add_place, describe_early_end, describe_place
 from service.grading.judging.outcome import Outcome, combine_outcomes, compute_marks, round_to_steps
 from service.grading.judging.source_answers import SourceAnswers
+from service.grading.pools.pool_sentences import describe_pool_value, describe_public_value
+from service.grading.pools.pool_values import ERROR_OF_GRADE, compute_share
 from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
@@ -122,19 +124,32 @@ def judge_by_trial(
     """Combine the outcomes of the trials into a result. ``get_outcome`` gets the trial's index in the grade."""
     trials = case.list_trials(criterion)
     outcomes = [get_outcome(index, trial) for index, trial in trials]
-    share = combine_outcomes(outcomes, criterion.over)
+    pool = case.assignment.find_pool(criterion)
+    pool_value = None
+    message, shown = summarise(trials, outcomes), _build_visible_feedback(trials, outcomes, summarise)
+    if pool is None:
+        share = combine_outcomes(outcomes, criterion.over)
+        share = round_to_steps(share) if has_hidden(trials) else share
+    else:
+        error = ERROR_OF_GRADE / len(case.assignment.chance_criteria)
+        share, pool_value = compute_share(criterion, outcomes, pool.trials, error)
+        message = join_sentences(message, describe_pool_value(pool_value, criterion.over))
+        if shown is not None:
+            public_value = describe_public_value(pool_value, criterion.over)
+            shown = replace(shown, message=join_sentences(shown.message, public_value))
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
-        marks=compute_marks(criterion.marks, round_to_steps(share) if has_hidden(trials) else share),
+        marks=compute_marks(criterion.marks, share),
         max_marks=criterion.marks,
-        message=summarise(trials, outcomes),
+        message=message,
         visibility=criterion.visibility,
         evidence=tuple(
             Evidence(index, outcome.passed, outcome.message, outcome.t, outcome.pose, outcome.measures)
             for (index, _), outcome in zip(trials, outcomes, strict=True)
         ),
-        shown=_build_visible_feedback(trials, outcomes, summarise),
+        shown=shown,
+        pool=pool_value,
         findings={
             index: outcome.findings for (index, _), outcome in zip(trials, outcomes, strict=True) if outcome.findings
         },

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from service.grading.grade import Accuracy, Grade, StaffAdjustment
+from service.grading.grade import Accuracy, Grade, PoolValue, StaffAdjustment
 from service.reports.diagnosis import Excerpt, diagnose
 from service.reports.display_text import to_json_number
 from service.reports.formats.registry import register_document, register_refusal, register_table
@@ -49,6 +49,7 @@ def build_json_document(view: View, submission: Submission | None = None) -> dic
                 "marks": to_json_number(result.marks),
                 "max_marks": to_json_number(result.max_marks),
                 "message": replace_surrogates(result.message),
+                **({"pool": _pool_to_json(result.pool)} if result.pool is not None else {}),
                 **({"for_staff": replace_surrogates(result.for_staff)} if result.for_staff else {}),
                 **({"set_by_hand": _adjustment_to_json(result.set_by_hand)} if result.set_by_hand is not None else {}),
             }
@@ -118,6 +119,11 @@ def _excerpt_to_json(excerpt: Excerpt) -> dict[str, Any]:
         {"number": line.number, "text": replace_surrogates(line.text), "marked": line.marked} for line in excerpt.lines
     ]
     return {"of": replace_surrogates(excerpt.name), "lines": lines}
+
+
+def _pool_to_json(pool: PoolValue) -> dict[str, Any]:
+    """Return the value over a pool; ``least`` and ``most`` are its bounds, from 0 to 1."""
+    return {"trials": pool.size, "run": pool.drawn, "least": pool.least, "most": pool.most, "exact": pool.is_exact}
 
 
 def _adjustment_to_json(adjustment: StaffAdjustment) -> dict[str, Any]:

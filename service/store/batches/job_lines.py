@@ -62,6 +62,7 @@ class JobLine:
     suspect: str | None  # why the grade is not trusted
     staff_only: str | None  # the limit that the submission exceeds
     unjudged: int  # criteria that could not be judged and were not set by staff
+    provisional: bool  # the marks depend on a pool of which not all trials were run
     set_by_hand: int  # criteria set by staff
     surprises: int  # trials in which Robomark's own code failed on data from a child
     days_late: int
@@ -222,6 +223,7 @@ def _build_job_line(row: Row[*_JobColumns]) -> JobLine:
         suspect=job.suspect,
         staff_only=staff_only,
         unjudged=has_unjudged or 0,
+        provisional=job.provisional,
         set_by_hand=has_override or 0,
         surprises=surprises or 0,
         days_late=days_late,

@@ -30,6 +30,7 @@ class PublicationCounts:
     dead: int
     staff_only: int
     unjudged: int
+    provisional: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,29 +41,31 @@ class PublicationPreview:
     students: int
 
 
-def publish_batch(session: Session, batch_id: str, *, actor: str, includes_unjudged: bool = False) -> PublicationCounts:
+def publish_batch(
+    session: Session, batch_id: str, *, actor: str, includes_held_back: bool = False
+) -> PublicationCounts:
     """Publish the standing grades of a batch. The newest regrade of each submission becomes its standing grade first.
 
-    Grades that are suspect, over a limit or have an unjudged criterion are not published. ``includes_unjudged``
-    includes those with an unjudged criterion.
+    Grades that are suspect or over a limit are not published. Those with an unjudged criterion, and provisional ones,
+    are held back unless ``includes_held_back``.
     """
     return _publish_grades(
-        session, _select_batch_submissions(batch_id), actor=actor, includes_unjudged=includes_unjudged
+        session, _select_batch_submissions(batch_id), actor=actor, includes_held_back=includes_held_back
     )
 
 
-def publish_grade(session: Session, job_id: str, *, actor: str, includes_unjudged: bool = False) -> PublicationCounts:
+def publish_grade(session: Session, job_id: str, *, actor: str, includes_held_back: bool = False) -> PublicationCounts:
     """Publish the grade of one submission, selected by a job, like ``publish_batch``."""
     return _publish_grades(
-        session, select(Job.submission_id).where(Job.id == job_id), actor=actor, includes_unjudged=includes_unjudged
+        session, select(Job.submission_id).where(Job.id == job_id), actor=actor, includes_held_back=includes_held_back
     )
 
 
 def preview_publication(session: Session, batch_id: str) -> PublicationPreview:
-    """Return the effect of ``publish_batch`` without unjudged grades. Read-only."""
+    """Return the effect of ``publish_batch`` without grades that are held back. Read-only."""
     submission_ids = _select_batch_submissions(batch_id)
     plan = _build_plan(
-        session, session.scalars(_select_gradings(submission_ids)).all(), submission_ids, includes_unjudged=False
+        session, session.scalars(_select_gradings(submission_ids)).all(), submission_ids, includes_held_back=False
     )
     return PublicationPreview(plan.counts, len({job.enrolment_id for job in plan.released}))
 
@@ -93,14 +96,14 @@ def _select_batch_submissions(batch_id: str) -> Select[int]:
 
 
 def _publish_grades(
-    session: Session, submission_ids: Select[int], *, actor: str, includes_unjudged: bool
+    session: Session, submission_ids: Select[int], *, actor: str, includes_held_back: bool
 ) -> PublicationCounts:
     current_time = now(session)
     lock_submissions(session, SubmissionRow.id.in_(submission_ids))
     lock_jobs(session, Job.submission_id.in_(submission_ids))
     # Jobs that were read before the lock may have changed.
     gradings = session.scalars(_select_gradings(submission_ids).execution_options(populate_existing=True)).all()
-    plan = _build_plan(session, gradings, submission_ids, includes_unjudged=includes_unjudged)
+    plan = _build_plan(session, gradings, submission_ids, includes_held_back=includes_held_back)
     for job in plan.outdated:
         job.standing = Standing.KEPT
     # The database rejects a second standing job of a submission, even within a transaction.
@@ -118,17 +121,19 @@ def _select_gradings(submission_ids: Select[int]) -> Select[Job]:
 
 
 def _build_plan(
-    session: Session, gradings: Sequence[Job], submission_ids: Select[int], *, includes_unjudged: bool
+    session: Session, gradings: Sequence[Job], submission_ids: Select[int], *, includes_held_back: bool
 ) -> _Plan:
     jobs_by_submission: dict[int, list[Job]] = {}
     for job in gradings:
         jobs_by_submission.setdefault(job.submission_id, []).append(job)
     over_limit = (SubmissionRow.id.in_(submission_ids), SubmissionRow.staff_only.is_not(None))
     hidden_submissions = set(session.scalars(select(SubmissionRow.id).where(*over_limit)))
-    unjudged_ids = set() if includes_unjudged else _load_unjudged_jobs(session, submission_ids)
+    unjudged_ids = set() if includes_held_back else _load_unjudged_jobs(session, submission_ids)
+    provisional_ids = set() if includes_held_back else {job.id for job in gradings if job.provisional}
+    held_back_ids = unjudged_ids | provisional_ids
     released_jobs, proposed_jobs, outdated_jobs, remaining_jobs = [], [], [], []
     for submission_id, jobs in jobs_by_submission.items():
-        standing_job, replaced_jobs = _choose_standing_job(jobs, unjudged_ids)
+        standing_job, replaced_jobs = _choose_standing_job(jobs, held_back_ids)
         outdated_jobs += replaced_jobs
         remaining_jobs += [job for job in jobs if job not in replaced_jobs]
         if standing_job is not None and standing_job.standing is Standing.PROPOSED:
@@ -138,21 +143,22 @@ def _build_plan(
     counts = PublicationCounts(
         len(released_jobs),
         len(proposed_jobs),
-        sum(job.state in UNFINISHED for job in remaining_jobs),
+        sum(job.state in UNFINISHED and not job.whole_pools for job in remaining_jobs),
         sum(job.state is JobState.DEAD for job in remaining_jobs),
         len(hidden_submissions),
         sum(job.id in unjudged_ids and job.published_at is None for job in remaining_jobs),
+        sum(job.id in provisional_ids and job.published_at is None for job in remaining_jobs),
     )
     return _Plan(released_jobs, proposed_jobs, outdated_jobs, counts)
 
 
-def _choose_standing_job(jobs: Sequence[Job], unjudged_ids: Set[str]) -> tuple[Job | None, list[Job]]:
+def _choose_standing_job(jobs: Sequence[Job], held_back_ids: Set[str]) -> tuple[Job | None, list[Job]]:
     """Return the new standing job of a submission, and the jobs that it replaces.
 
     The newest trusted regrade replaces the standing job, regardless of its age, and every older proposal. Ungraded and
-    ``unjudged_ids`` jobs remain proposals.
+    ``held_back_ids`` jobs remain proposals.
     """
-    trusted_jobs = [job for job in jobs if current_grades.is_trusted(job) and job.id not in unjudged_ids]
+    trusted_jobs = [job for job in jobs if current_grades.is_trusted(job) and job.id not in held_back_ids]
     proposed_jobs = [job for job in trusted_jobs if job.standing is Standing.PROPOSED]
     if not proposed_jobs:
         return next((job for job in trusted_jobs if job.standing is Standing.STANDS), None), []

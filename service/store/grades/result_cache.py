@@ -27,12 +27,14 @@ _NOT_REPEATABLE = ("cpu_limit", "memory_limit", "stalled", "host_error")
 def compute_cache_key(session: Session, job_id: str, grader_sha256: str, secret_sha256: str) -> str:
     """Return the cache key of a job. Equal keys mean equal grades: assignment and secret determine the seeds."""
     query = (
-        select(SubmissionRow.sha256, AssignmentVersion.sha256)
+        select(SubmissionRow.sha256, AssignmentVersion.sha256, Job.whole_pools)
         .join(Job, Job.submission_id == SubmissionRow.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id == job_id)
     )
-    return combine_cache_key(*session.execute(query).one(), grader_sha256, secret_sha256)
+    submission_sha256, assignment_sha256, whole_pools = session.execute(query).one()
+    key = combine_cache_key(submission_sha256, assignment_sha256, grader_sha256, secret_sha256)
+    return hashlib.sha256(f"{key}\nwhole pools".encode()).hexdigest() if whole_pools else key
 
 
 def combine_cache_key(submission_sha256: str, assignment_sha256: str, grader_sha256: str, secret_sha256: str) -> str:
@@ -84,7 +86,7 @@ def build_copied_values(session: Session, source_id: str, job_id: str, current_t
     """Return the column values that a job takes over from a copied grade."""
     source = session.scalars(select(Job).where(Job.id == source_id)).one()
     queued_at = session.scalar(select(Job.queued_at).where(Job.id == job_id))
-    grade_columns = ("verdict", "sandbox", "grader_version", "missing", "hints", "sentences", "cost")
+    grade_columns = ("verdict", "sandbox", "grader_version", "missing", "hints", "sentences", "provisional", "cost")
     names = (*grade_columns, "grader_sha256", "secret_sha256", "cache_key")
     has_plots = source.plots is PlotState.DONE
     return {name: getattr(source, name) for name in names} | {

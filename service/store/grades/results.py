@@ -23,6 +23,7 @@ from service.grading.grade import (
     CriterionResult,
     Evidence,
     Grade,
+    PoolValue,
     Prediction,
     StaffAdjustment,
     TrialResult,
@@ -307,6 +308,7 @@ def _build_criterion_row(
         predictions=predictions,
         shown=result.shown and encode(result.shown),
         for_staff=result.for_staff,
+        pool=result.pool and encode(result.pool),
     )
 
 
@@ -341,6 +343,7 @@ def _build_criterion(row: CriterionResultRow, trials: tuple[TrialResult, ...]) -
         shown=None if row.shown is None else decode(VisibleFeedback, row.shown),
         unjudged=row.unjudged or "",
         for_staff=row.for_staff,
+        pool=None if row.pool is None else decode(PoolValue, row.pool),
     )
 
 

@@ -125,7 +125,7 @@ CREATE TABLE job (
 	plots VARCHAR(16) NOT NULL, 
 	plots_due_at DATETIME, 
 	plots_attempt INTEGER NOT NULL, 
-	plotted_at DATETIME, process INTEGER, phases JSON DEFAULT '{}' NOT NULL, grader_sha256 VARCHAR(64), cache_key VARCHAR(64), forced BOOLEAN DEFAULT 0 NOT NULL, copied_from VARCHAR(12) CONSTRAINT fk_job_copied_from_job REFERENCES job (id), regrade_of VARCHAR(12) CONSTRAINT fk_job_regrade_of_job REFERENCES job (id), standing VARCHAR(16) DEFAULT 'stands' NOT NULL, suspect TEXT, published_at DATETIME, published_by TEXT, secret_sha256 VARCHAR(64), cost JSON, missing TEXT DEFAULT '' NOT NULL, hints JSON DEFAULT '[]' NOT NULL, cancelled_for VARCHAR(16), superseded_by VARCHAR(12), sentences JSON DEFAULT '[]' NOT NULL, 
+	plotted_at DATETIME, process INTEGER, phases JSON DEFAULT '{}' NOT NULL, grader_sha256 VARCHAR(64), cache_key VARCHAR(64), forced BOOLEAN DEFAULT 0 NOT NULL, copied_from VARCHAR(12) CONSTRAINT fk_job_copied_from_job REFERENCES job (id), regrade_of VARCHAR(12) CONSTRAINT fk_job_regrade_of_job REFERENCES job (id), standing VARCHAR(16) DEFAULT 'stands' NOT NULL, suspect TEXT, published_at DATETIME, published_by TEXT, secret_sha256 VARCHAR(64), cost JSON, missing TEXT DEFAULT '' NOT NULL, hints JSON DEFAULT '[]' NOT NULL, cancelled_for VARCHAR(16), superseded_by VARCHAR(12), sentences JSON DEFAULT '[]' NOT NULL, whole_pools BOOLEAN DEFAULT 0 NOT NULL, provisional BOOLEAN DEFAULT 0 NOT NULL, 
 	CONSTRAINT pk_job PRIMARY KEY (id), 
 	CONSTRAINT ck_job_lease CHECK ((state = 'running') = (lease IS NOT NULL)), 
 	CONSTRAINT fk_job_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
@@ -178,7 +178,7 @@ CREATE TABLE criterion_result (
 	accuracy_n INTEGER, 
 	labels JSON, 
 	confusion JSON, 
-	predictions JSON NOT NULL, counts JSON, confidence JSON, curves JSON DEFAULT '[]' NOT NULL, shown JSON, for_staff TEXT DEFAULT '' NOT NULL, unjudged TEXT, 
+	predictions JSON NOT NULL, counts JSON, confidence JSON, curves JSON DEFAULT '[]' NOT NULL, shown JSON, for_staff TEXT DEFAULT '' NOT NULL, unjudged TEXT, pool JSON, 
 	CONSTRAINT pk_criterion_result PRIMARY KEY (id), 
 	CONSTRAINT fk_criterion_result_job_id_job FOREIGN KEY(job_id) REFERENCES job (id) ON DELETE CASCADE
 );
@@ -490,8 +490,8 @@ CREATE TABLE "open_assignment" (
 	names_hidden BOOLEAN NOT NULL, 
 	batch_id VARCHAR(12), 
 	CONSTRAINT pk_open_assignment PRIMARY KEY (id), 
-	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
+	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_batch_id_batch FOREIGN KEY(batch_id) REFERENCES batch (id)
 );
 

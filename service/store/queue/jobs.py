@@ -27,7 +27,7 @@ from service.store.grades import overrides, plots, result_cache
 from service.store.grades.grade_sentences import encode_sentences
 from service.store.installation import load_secret
 from service.store.locks import match_and_lock_jobs
-from service.store.queue import workers
+from service.store.queue import pool_completions, workers
 from service.store.queue.job_transitions import (
     ASK_FOR,
     CANCEL,
@@ -100,7 +100,7 @@ def copy_grade(session: Session, job_id: str, source_id: str, current_time: date
     if not apply_transition(session, COPY, (Job.id == job_id,), current_time, values):
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
-    overrides.recount_marks(session, job_id)
+    _settle_grade(session, job_id, current_time)
     outbox.emit_grade_copied(session, job_id)
 
 
@@ -230,6 +230,7 @@ def finish_job(
             "notes": list(grade.notes),
             "hints": list(grade.hints),
             "sentences": encode_sentences(grade),
+            "provisional": grade.is_provisional,
             "cost": grade.cost and encode(grade.cost),
             "plots": PlotState.DUE,
             "plots_due_at": current_time,
@@ -237,7 +238,7 @@ def finish_job(
         _check_not_quarantined(session, claim)
         _apply_owned_transition(session, FINISH, claim, current_time, values)
         results.insert_grade(session, claim.job_id, prepared_grade, current_time)
-        overrides.recount_marks(session, claim.job_id)
+        _settle_grade(session, claim.job_id, current_time)
         outbox.emit_grade_finished(session, claim.job_id)
 
 
@@ -265,9 +266,19 @@ def finish_job_from_cache(store: Store, claim: Claim) -> bool:
             result_cache.build_copied_values(session, source, claim.job_id, current_time),
         )
         result_cache.copy_rows(session, source, claim.job_id)
-        overrides.recount_marks(session, claim.job_id)
+        _settle_grade(session, claim.job_id, current_time)
         outbox.emit_grade_finished(session, claim.job_id)
         return True
+
+
+def _settle_grade(session: Session, job_id: str, current_time: datetime) -> None:
+    """Compute the marks of a stored grade, and queue or apply the completion of its pools."""
+    overrides.recount_marks(session, job_id)
+    job = session.get_one(Job, job_id, populate_existing=True)
+    if job.provisional:
+        enqueue(session, pool_completions.build_completion(job), current_time)
+    if job.whole_pools and job.regrade_of is not None:
+        pool_completions.replace_provisional_grade(session, job, current_time)
 
 
 @retry_conflicts

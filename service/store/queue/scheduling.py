@@ -106,8 +106,8 @@ def check_worker(session: Session, worker: str) -> datetime | None:
 def find_next_job(session: Session, current_time: datetime, worker: str) -> str | None:
     """Return the id of the job that ``worker`` should claim next; None if no job is due.
 
-    Interactive jobs come first, except for one job in five. Within a queue, the course with the fewest recently started
-    jobs comes first, then the batch, then the student, then the oldest job.
+    Interactive jobs come first, except for one job in five, and completions of pools last. Within a queue, the course
+    with the fewest recently started jobs comes first, then the batch, then the student, then the oldest job.
     """
     connection = session.connection()
     parameters = {
@@ -144,8 +144,9 @@ def _rank_groups(groups: Sequence[_Group], job_counts: Mapping[_Group, int]) -> 
     has_batch_turn = lanes[JobQueue.INTERACTIVE] >= (BATCH_JOB_INTERVAL - 1) * (lanes[JobQueue.BATCH] + 1)
     first_queue = JobQueue.BATCH if has_batch_turn else JobQueue.INTERACTIVE
 
-    def compute_rank(group: _Group) -> tuple[bool, int, int]:
-        return group.lane is not first_queue, courses[group.course_id], batches[group.batch_id]
+    def compute_rank(group: _Group) -> tuple[bool, bool, int, int]:
+        is_completion = group.lane is JobQueue.COMPLETION
+        return is_completion, group.lane is not first_queue, courses[group.course_id], batches[group.batch_id]
 
     for _, tied_groups in groupby(sorted(groups, key=compute_rank), compute_rank):
         yield list(tied_groups)

@@ -67,6 +67,7 @@ class CriterionResultRow(Base):
     predictions: Mapped[Any]
     shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} of the visible trials only
     for_staff: Mapped[str] = mapped_column(default="")  # hint for a review by staff; never shown to students
+    pool: Mapped[Any | None]  # {"size": 200, "drawn": 24, "least": 0.62, "most": 0.9, "is_decided": true}
 
 
 class Artifact(Base):

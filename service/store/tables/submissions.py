@@ -128,6 +128,8 @@ class Job(Base):
     #: [["template", {"name": value}], ...]: those texts of the grade that can be translated.
     sentences: Mapped[Any] = mapped_column(default=list, deferred=True)
     missing: Mapped[str] = mapped_column(default="")  # the required part that was not submitted
+    whole_pools: Mapped[bool] = mapped_column(default=False)  # run all trials of pools, not only the first
+    provisional: Mapped[bool] = mapped_column(default=False)  # its marks depend on a pool that was not run completely
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 
     #: Times of one grading, ISO 8601 UTC, by the names in ``phases``.

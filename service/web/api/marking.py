@@ -260,6 +260,12 @@ def ask(access: OwnerAccess, context: Context, submission_id: RowNumber, body: T
     return _list_own_appeals(context, access, submission_id)
 
 
+@router.post("/courses/{course_id}/mine/submissions/{submission_id}/all-trials", status_code=204)
+def run_all_trials(access: OwnerAccess, context: Context, submission_id: RowNumber) -> None:
+    """Run all trials of a grade with provisional marks now, so that its marks become exact."""
+    appeals.run_all_trials(context.service, access.actor, access.course_id, submission_id)
+
+
 def _list_own_appeals(context: WebContext, access: CallerInCourse, submission_id: int) -> Listed[AppealShape]:
     appeals_view = appeals.show_own(context.service, access.actor, access.course_id, submission_id)
     return Listed(items=[AppealShape.model_validate(each) for each in appeals_view.appeals])

@@ -111,7 +111,8 @@ class PublishBody(BaseModel):
     """Options for publishing grades."""
 
     anyway: bool = Field(
-        False, description="Also publish grades with a criterion that could not be judged; it gives no marks."
+        False,
+        description="Also publish provisional grades, and grades with a criterion that could not be judged.",
     )
 
 
@@ -124,8 +125,11 @@ class PublishedShape(Shape):
     dead: int
     staff_only: int
     unjudged: int
+    provisional: int
 
-    model_config = build_example_config(published=19, replaced=0, unfinished=0, dead=1, staff_only=0, unjudged=0)
+    model_config = build_example_config(
+        published=19, replaced=0, unfinished=0, dead=1, staff_only=0, unjudged=0, provisional=0
+    )
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/regrades", status_code=201)
@@ -152,9 +156,9 @@ def changes(
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")
 def publish(access: MarkAccess, context: Context, batch_id: RowName, body: PublishBody | None = None) -> PublishedShape:
     """Publish the newest grades of a batch. They become the current grades, and students can see them."""
-    includes_unjudged = body is not None and body.anyway
+    includes_held_back = body is not None and body.anyway
     publication_counts = operations.publish(
-        context.service, access.actor, access.course_id, batch_id, includes_unjudged=includes_unjudged
+        context.service, access.actor, access.course_id, batch_id, includes_held_back=includes_held_back
     )
     return PublishedShape.model_validate(publication_counts)
 
@@ -164,9 +168,9 @@ def publish_one(
     access: MarkAccess, context: Context, job_id: RowName, body: PublishBody | None = None
 ) -> PublishedShape:
     """Publish the newest grade of a submission. It becomes the current grade, and the student can see it."""
-    includes_unjudged = body is not None and body.anyway
+    includes_held_back = body is not None and body.anyway
     publication_counts = operations.publish_one(
-        context.service, access.actor, access.course_id, job_id, includes_unjudged=includes_unjudged
+        context.service, access.actor, access.course_id, job_id, includes_held_back=includes_held_back
     )
     return PublishedShape.model_validate(publication_counts)
 

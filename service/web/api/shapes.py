@@ -96,6 +96,7 @@ class JobShape(Shape):
         description="ID of the job whose grade was copied for an identical submission; null otherwise."
     )
     unjudged: int = Field(description="Number of criteria that could not be judged and need review.")
+    provisional: bool = Field(description="Whether the marks depend on a pool of which not all trials were run.")
 
     model_config = build_example_config(
         id="7xk2v9q4m0ab",
@@ -119,6 +120,7 @@ class JobShape(Shape):
         missing="",
         copied_from=None,
         unjudged=0,
+        provisional=False,
     )
 
 

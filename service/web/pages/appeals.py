@@ -73,6 +73,13 @@ def show_own_appeals(request: Request, access: CourseStudent, context: Context, 
     )
 
 
+@router.post("/mine/submissions/{submission_id}/all-trials")
+def run_all_trials(access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
+    """Run all trials of the pools of a submission now."""
+    appeals.run_all_trials(context.service, access.actor, access.course_id, submission_id)
+    return RedirectResponse(f"/courses/{access.course_id}/mine/submissions/{submission_id}/appeal", 303)
+
+
 @router.post("/mine/submissions/{submission_id}/appeal")
 def submit_appeal(access: CourseStudent, context: Context, submission_id: RowNumber, text: Text = "") -> Response:
     """Submit an appeal."""

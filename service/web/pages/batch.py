@@ -206,7 +206,7 @@ def publish(
     access: CourseInstructor, context: Context, batch_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Make the newest grades of a batch the current grades, and release them to the students."""
-    regrade_operations.publish(context.service, access.actor, access.course_id, batch_id, includes_unjudged=anyway)
+    regrade_operations.publish(context.service, access.actor, access.course_id, batch_id, includes_held_back=anyway)
     return _redirect_to_batch(access, batch_id, "publish")
 
 

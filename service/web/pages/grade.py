@@ -53,7 +53,7 @@ def publish(
     access: CourseInstructor, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False
 ) -> Response:
     """Make the newest grade of this submission the current grade, and release it to the student."""
-    regrades.publish_one(context.service, access.actor, access.course_id, job_id, includes_unjudged=anyway)
+    regrades.publish_one(context.service, access.actor, access.course_id, job_id, includes_held_back=anyway)
     return RedirectResponse(f"/courses/{access.course_id}/grades/{job_id}?done=publish", 303)
 
 

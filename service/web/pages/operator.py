@@ -29,6 +29,7 @@ router = APIRouter()
 _QUEUE_TITLES = {
     JobQueue.INTERACTIVE: translatable("interactive: single submissions"),
     JobQueue.BATCH: translatable("batch: whole classes"),
+    JobQueue.COMPLETION: translatable("completion: the other trials of pools"),
 }
 _TEST_RUNS_TITLE = translatable("test runs: programs that run without marks")
 

@@ -94,6 +94,18 @@ def _ask(state: str, refused: tuple[int, str] | None = None) -> Row:
     )
 
 
+def _run_all_trials(state: str, refused: tuple[int, str] | None = None) -> Row:
+    return Row(
+        appeals.run_all_trials,
+        ("mine/submissions/1/all-trials", {}),
+        ("POST", "mine/submissions/1/all-trials", None),
+        alone=_STUDENTS,
+        who="ada",
+        state=state,
+        refused=refused,
+    )
+
+
 def _send(
     operation: object, files: dict[str, str], refused: tuple[int, str] | None = None, state: str = "course"
 ) -> Row:
@@ -137,6 +149,8 @@ ROWS = {
     "answer no appeal": _answer(7, (422, "this course has no appeal 7")),
     "answer without text": _answer(1, (422, "0 characters"), text="  "),
     "appeal": _ask("answered"),
+    "run all trials": _run_all_trials("provisional"),
+    "run all trials of an exact grade": _run_all_trials("course", (422, "these marks are exact already")),
     "appeal twice": _ask("course", (422, "you already have an open appeal")),
     "submit": _send(submissions.submit, _BOTH),
     "submit nothing": _send(submissions.submit, {}, (422, "no files were submitted")),

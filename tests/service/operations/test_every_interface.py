@@ -29,6 +29,7 @@ from service.store.grades import appeals, comments, overrides
 from service.store.people import webhooks
 from service.store.queue import jobs, test_runs
 from service.store.states import JobState
+from service.store.tables.grades import CriterionResultRow
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
 from submissions.assignment.reader import find_assignment
@@ -106,7 +107,7 @@ def _graded(web: Web) -> dict[str, str]:
 
 def _regraded(web: Web) -> dict[str, str]:
     made = _graded(web)
-    acting.publish(web.store, made["batch_id"], includes_unjudged=True)
+    acting.publish(web.store, made["batch_id"], includes_held_back=True)
     acting.regrade(web.store, made["batch_id"])
     grade_all(web, report_builders.faulty_grade())
     return made
@@ -153,6 +154,15 @@ def _answered(web: Web) -> dict[str, str]:
     return {}
 
 
+def _provisional(web: Web) -> dict[str, str]:
+    pool = {"size": 200, "drawn": 4, "least": 0.1, "most": 0.9, "is_decided": False}
+    with web.store.transaction() as session:
+        (job_id,) = session.scalars(select(Job.id).where(Job.submission_id == 1))
+        session.execute(update(Job).where(Job.id == job_id).values(provisional=True))
+        session.execute(update(CriterionResultRow).where(CriterionResultRow.job_id == job_id).values(pool=pool))
+    return {}
+
+
 def _running_a_test(web: Web) -> dict[str, str]:
     with web.store.transaction() as session:
         version_id = open_assignments.load_course_assignment(session, 1, "echo-responder").version_id
@@ -190,6 +200,7 @@ STATES = {
     "over a limit": _over_a_limit,
     "marked": _marked,
     "answered": _answered,
+    "provisional": _provisional,
     "running a test": _running_a_test,
     "closed": _closed,
     "with a policy": _with_a_policy,

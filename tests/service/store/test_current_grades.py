@@ -231,7 +231,7 @@ def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excuse
     for program in ("one", "two"):
         job_id = _submit(store, program)
         _end_next(store)
-        acting.publish_one(store, job_id, actor="grace", includes_unjudged=True)
+        acting.publish_one(store, job_id, actor="grace", includes_held_back=True)
     passback.send_marks(store, link, 1, "echo-responder")
     assert [score.marks for score in sent] == [GRADE.marks]
     with store.transaction() as session:
@@ -299,11 +299,11 @@ def test_students_cannot_compare_hidden_marks_by_the_attempt_that_counts(store: 
         )
     assert _readers(store, None) == {"own list": None, "own page": None, "course": better}
     # The marks of one attempt are not enough for a comparison.
-    acting.publish_one(store, better, actor="grace", includes_unjudged=True)
+    acting.publish_one(store, better, actor="grace", includes_held_back=True)
     assert _readers(store, None) == {"own list": None, "own page": None, "course": better}
     if visibility == "after_due_date":
         with store.transaction() as session:
             policies.set_policy(session, 1, "", PolicyLimits(datetime(2020, 1, 1, tzinfo=UTC)))
     else:
-        acting.publish_one(store, worse, actor="grace", includes_unjudged=True)
+        acting.publish_one(store, worse, actor="grace", includes_held_back=True)
     assert set(_readers(store, None).values()) == {better}

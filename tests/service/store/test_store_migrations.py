@@ -214,7 +214,7 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
         # The new release grades, publishes and extends the old regrades.
         while claim := jobs.claim_job(store, "worker", 60):
             jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
-        acting.publish(store, batch, includes_unjudged=True)
+        acting.publish(store, batch, includes_held_back=True)
         assert accept_one(store, "eve").attempt == 1
 
 

@@ -122,7 +122,7 @@ def test_what_could_not_be_judged_is_named_and_stays_back(store: Store) -> None:
     assert acting.publish(store, batch, actor="staff") == PublicationCounts(1, 0, 0, 0, 0, 1)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is None
-    assert acting.publish(store, batch, actor="staff", includes_unjudged=True) == PublicationCounts(1, 0, 0, 0, 0, 0)
+    assert acting.publish(store, batch, actor="staff", includes_held_back=True) == PublicationCounts(1, 0, 0, 0, 0, 0)
     with store.reading() as session:
         assert session.get_one(Job, left.id).published_at is not None
     assert acting.publish(store, batch, actor="staff") == PublicationCounts(0, 0, 0, 0, 0, 0)

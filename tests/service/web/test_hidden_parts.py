@@ -109,7 +109,7 @@ def _answers(
         graded = _unjudged(grade(submission, assignment, secret=load_secret(web.store), runner=runner))
         jobs.finish_job(web.store, claim, results.prepare_grade(graded), datetime.now(UTC))
         responses |= student_reader.everything("graded")
-        acting.publish(web.store, batch_id, actor="grace", includes_unjudged=True)
+        acting.publish(web.store, batch_id, actor="grace", includes_held_back=True)
         responses |= student_reader.everything("published")
         for form in ("moodle", "gradescope"):
             responses[form] = acting.export_file(web.store, batch_id, form, published=False).data.decode()

@@ -77,7 +77,7 @@ def test_students_read_no_fault_of_ours(web: Web, ending: str) -> None:
     claim = jobs.claim_job(web.store, _SECRET, 60)
     assert claim is not None
     _ENDINGS[ending](web, claim)
-    acting.publish(web.store, batch_id, actor="grace", includes_unjudged=True)
+    acting.publish(web.store, batch_id, actor="grace", includes_held_back=True)
     assert _read_by_students(web, ada, batch_id, claim.job_id, _SECRET) == []
 
 

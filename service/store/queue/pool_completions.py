@@ -1,0 +1,55 @@
+"""Completion of pools: further gradings that run all trials of a pool after the first ones gave provisional marks.
+
+A completion is a job in the lowest queue, until somebody waits for it. Its grade replaces the provisional one.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service.store.states import JobQueue, Standing
+from service.store.tables.submissions import Job
+
+
+def build_completion(job: Job) -> Job:
+    """Return the job that completes the pools of a provisional grade."""
+    return Job(
+        submission_id=job.submission_id,
+        assignment_version_id=job.assignment_version_id,
+        enrolment_id=job.enrolment_id,
+        batch_id=None,
+        lane=JobQueue.COMPLETION,
+        max_attempts=job.max_attempts,
+        regrade_of=job.id,
+        standing=Standing.PROPOSED,
+        whole_pools=True,
+    )
+
+
+def is_completion(session: Session, job_id: str) -> bool:
+    """Return whether the job runs all trials of its pools."""
+    return bool(session.scalar(select(Job.whole_pools).where(Job.id == job_id)))
+
+
+def replace_provisional_grade(session: Session, completion: Job, current_time: datetime) -> bool:
+    """Put the grade of a finished completion in the place of the provisional one. Return whether students see a change.
+
+    The provisional grade may have been published on purpose. Then the exact one is published too, unless it is lower:
+    a student keeps marks that were published. A grade that was replaced meanwhile is not replaced again.
+    """
+    provisional = session.get_one(Job, completion.regrade_of, with_for_update={"key_share": True})
+    is_lower = (completion.marks or 0) < (provisional.marks or 0)
+    if provisional.standing is Standing.KEPT or (provisional.published_at is not None and is_lower):
+        completion.standing = Standing.KEPT
+        return False
+    new_standing, provisional.standing = provisional.standing, Standing.KEPT
+    # The database rejects a second standing job of a submission, even within a transaction.
+    session.flush()
+    completion.standing = new_standing
+    if provisional.published_at is None:
+        return False
+    completion.published_at, completion.published_by = current_time, provisional.published_by
+    return completion.marks != provisional.marks
