@@ -121,6 +121,28 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
+class PoolValue:
+    """The value of a criterion over a pool of ``size`` trials, of which ``drawn`` were run.
+
+    ``least`` and ``most`` are the bounds of the value, from 0 to 1; equal if the value is exact. ``is_decided`` says
+    whether all values within the bounds give the same marks. ``note`` says all this in sentences. For students, if
+    trials are hidden, the bounds are rounded and ``drawn`` is 0 until the value is exact.
+    """
+
+    size: int
+    drawn: int
+    least: float
+    most: float
+    is_decided: bool
+    note: str = ""
+
+    @property
+    def is_exact(self) -> bool:
+        """Return whether the whole pool was run."""
+        return self.drawn == self.size
+
+
+@dataclass(frozen=True, slots=True)
 class VisibleFeedback:
     """The feedback on a criterion that has hidden trials, made from its visible trials only.
 
@@ -130,6 +152,7 @@ class VisibleFeedback:
     message: str
     accuracy: Accuracy | None = None
     curves: tuple[AccuracyCurve, ...] = ()
+    pool: PoolValue | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,26 +171,6 @@ class WrittenComment:
 
     criterion: str
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class PoolValue:
-    """The value of a criterion over a pool of ``size`` trials, of which ``drawn`` were run.
-
-    ``least`` and ``most`` are the bounds of the value, from 0 to 1; equal if the value is exact. ``is_decided`` says
-    whether all values within the bounds give the same marks.
-    """
-
-    size: int
-    drawn: int
-    least: float
-    most: float
-    is_decided: bool
-
-    @property
-    def is_exact(self) -> bool:
-        """Return whether the whole pool was run."""
-        return self.drawn == self.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +320,16 @@ def _convert_result(result: CriterionResult, convert: Callable[[str], str]) -> C
         result,
         message=convert(result.message),
         evidence=tuple(replace(each, message=convert(each.message)) for each in result.evidence),
-        shown=None if result.shown is None else replace(result.shown, message=convert(result.shown.message)),
+        shown=None if result.shown is None else _convert_feedback(result.shown, convert),
+        pool=_convert_pool(result.pool, convert),
         unjudged=convert(result.unjudged),
         for_staff=convert(result.for_staff),
     )
+
+
+def _convert_feedback(feedback: VisibleFeedback, convert: Callable[[str], str]) -> VisibleFeedback:
+    return replace(feedback, message=convert(feedback.message), pool=_convert_pool(feedback.pool, convert))
+
+
+def _convert_pool(pool: PoolValue | None, convert: Callable[[str], str]) -> PoolValue | None:
+    return None if pool is None else replace(pool, note=convert(pool.note))

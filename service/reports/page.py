@@ -73,6 +73,7 @@ class CriterionLine:
     moment: str  # a link to the moment in the replay, with its text; empty if there is none
     watch: str
     for_staff: str
+    pool: str  # whether the marks are exact or provisional, if they are defined over a pool
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +278,7 @@ def _build_criterion_line(
         moment="" if watched_failure is None else format_moment_link(watched_failure.trial + 1, seconds),
         watch="" if watched_failure is None else _format_watch_label(grade, watched_failure.trial, seconds, language),
         for_staff=to_display_text(result.for_staff, 1000, lines=4),
+        pool=result.pool.note if result.pool is not None else "",
     )
 
 

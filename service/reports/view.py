@@ -255,5 +255,5 @@ def _remove_hidden_trials(result: CriterionResult, new_index: dict[int, int]) ->
         accuracy=visible_feedback.accuracy,
         curves=visible_feedback.curves,
         shown=None,
-        pool=None,  # the message has its bounds, rounded
+        pool=visible_feedback.pool,
     )

@@ -15,7 +15,7 @@ from service.grading.grade import CriterionResult, Evidence, TrialResult, Visibl
 from service.grading.judging.message_parts import add_hidden_note, add_place, describe_early_end, describe_place
 from service.grading.judging.outcome import Outcome, combine_outcomes, compute_marks, round_to_steps
 from service.grading.judging.source_answers import SourceAnswers
-from service.grading.pools.pool_sentences import describe_pool_value, describe_public_value
+from service.grading.pools.pool_sentences import describe_for_staff, describe_for_students
 from service.grading.pools.pool_values import ERROR_OF_GRADE, compute_share
 from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
@@ -133,10 +133,11 @@ def judge_by_trial(
     else:
         error = ERROR_OF_GRADE / len(case.assignment.chance_criteria)
         share, pool_value = compute_share(criterion, outcomes, pool.trials, error)
-        message = join_sentences(message, describe_pool_value(pool_value, criterion.over))
+        public_value = describe_for_students(pool_value, criterion.over)
+        pool_value = describe_for_staff(pool_value, criterion.over)
+        message = join_sentences(message, pool_value.note)
         if shown is not None:
-            public_value = describe_public_value(pool_value, criterion.over)
-            shown = replace(shown, message=join_sentences(shown.message, public_value))
+            shown = replace(shown, message=join_sentences(shown.message, public_value.note), pool=public_value)
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,

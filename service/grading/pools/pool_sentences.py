@@ -6,34 +6,38 @@ Students see values over hidden trials in steps of 5 %, and no numbers of trials
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from service.grading.grade import PoolValue
 from service.grading.judging.outcome import Over
 from sim.sentences import Sentence, join_sentences
 
+_STUDENTS_STEP = 5  # per cent
 _CERTAINTY = 95  # per cent; see ``ERROR_OF_GRADE``
 
 
-def describe_pool_value(value: PoolValue, rule: Over) -> str:
-    """Return whether the marks are exact or provisional, and the bounds in per cent."""
+def describe_for_staff(value: PoolValue, rule: Over) -> PoolValue:
+    """Return the value with a note: whether the marks are exact or provisional, and the bounds in per cent."""
     if value.is_exact:
-        return Sentence("Exact: all %(size)s trials of the pool were run.", size=value.size)
+        return replace(value, note=Sentence("Exact: all %(size)s trials of the pool were run.", size=value.size))
     drawn = Sentence("Provisional: %(drawn)s of %(size)s trials were run.", drawn=value.drawn, size=value.size)
-    return join_sentences(drawn, _describe_bounds(value, rule, 1), _describe_decision(value))
+    return replace(value, note=join_sentences(drawn, _describe_bounds(value, rule, 1), _describe_decision(value)))
 
 
-def describe_public_value(value: PoolValue, rule: Over) -> str:
-    """Return the same for students if trials of the pool are hidden."""
+def describe_for_students(value: PoolValue, rule: Over) -> PoolValue:
+    """Return the value that students see if trials of the pool are hidden, with a note."""
+    least, most = _round_outwards(value, _STUDENTS_STEP)
     if value.is_exact:
-        return Sentence("Exact: all trials of the pool were run.")
-    bounds = _describe_bounds(value, rule, 5)
-    return join_sentences(Sentence("Provisional: not all trials were run yet."), bounds, _describe_decision(value))
+        note = Sentence("Exact: all trials of the pool were run.")
+        return replace(value, least=least / 100, most=most / 100, note=note)
+    bounds = _describe_bounds(value, rule, _STUDENTS_STEP)
+    provisional = Sentence("Provisional: not all trials were run yet.")
+    sentences = (provisional, bounds, _describe_decision(value))
+    return replace(value, drawn=0, least=least / 100, most=most / 100, note=join_sentences(*sentences))
 
 
 def _describe_bounds(value: PoolValue, rule: Over, step: int) -> str:
-    # Rounded outwards, so that they stay true.
-    least = step * math.floor(round(value.least * 100 / step, 6))
-    most = step * math.ceil(round(value.most * 100 / step, 6))
+    least, most = _round_outwards(value, step)
     match rule:
         case "share":
             return Sentence(
@@ -50,6 +54,12 @@ def _describe_bounds(value: PoolValue, rule: Over, step: int) -> str:
                 most=most,
             )
     return ""
+
+
+def _round_outwards(value: PoolValue, step: int) -> tuple[int, int]:
+    """Return the bounds in per cent, as multiples of ``step`` that are still true."""
+    least = step * math.floor(round(value.least * 100 / step, 6))
+    return least, step * math.ceil(round(value.most * 100 / step, 6))
 
 
 def _describe_decision(value: PoolValue) -> str:

@@ -10,7 +10,7 @@ import pytest
 from service.grading.grade import PoolValue
 from service.grading.judging.judge import JUDGES
 from service.grading.judging.outcome import Outcome
-from service.grading.pools.pool_sentences import describe_pool_value, describe_public_value
+from service.grading.pools.pool_sentences import describe_for_staff, describe_for_students
 from service.grading.pools.pool_values import compute_share
 from submissions.criteria import SCHEMAS
 from submissions.criteria.ending import Finishes
@@ -64,12 +64,16 @@ def test_marks_are_decided_when_all_values_within_the_bounds_give_the_same(
 
 def test_students_see_no_exact_share_of_hidden_trials() -> None:
     value = PoolValue(200, 23, 0.623, 0.861, False)
-    assert "23 of 200 trials" in describe_pool_value(value, "share")
-    assert "62 to 87 % of all trials" in describe_pool_value(value, "share")
-    public = describe_public_value(value, "share")
-    assert "60 to 90 % of all trials" in public
-    assert "23" not in public
-    assert "200" not in describe_public_value(PoolValue(200, 200, 0.6, 0.6, True), "share")
+    note = describe_for_staff(value, "share").note
+    assert "23 of 200 trials" in note
+    assert "62 to 87 % of all trials" in note
+    public = describe_for_students(value, "share")
+    assert (public.drawn, public.least, public.most, public.is_exact) == (0, 0.6, 0.9, False)
+    assert "60 to 90 % of all trials" in public.note
+    assert "23" not in public.note
+    exact = describe_for_students(PoolValue(200, 200, 0.623, 0.623, True), "share")
+    assert (exact.least, exact.most, exact.is_exact) == (0.6, 0.65, True)
+    assert "200" not in exact.note
 
 
 def test_criteria_that_judge_each_trial_can_have_a_pool() -> None:
