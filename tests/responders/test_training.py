@@ -13,6 +13,7 @@ from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.judging.collecting import collect_pairs
+from service.grading.judging.judge import judge
 from service.grading.trial_runner import TrialRunner
 from service.reports.verdict_sentences import describe_accuracy
 from service.reports.view import build_student_view
@@ -184,12 +185,19 @@ def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     assert sum(usable.values()) < len(pairs)
 
 
+@pytest.fixture(scope="module")
+def collected_grade(runner: TrialRunner) -> Grade:
+    assignment = find_assignment("collect-shapes")
+    submission = read_submission(locate_examples("collect-shapes") / "reference", required_parts=assignment.parts)
+    return grade(submission, assignment, runner=runner)
+
+
 @pytest.mark.parametrize(
     ("changes", "marks"),
     [({}, 4), ({"each": 4}, 4), ({"each": 50}, 0), ({"classes": ("square",)}, 4), ({"most_duplicates": 0.0}, 0)],
 )
-def test_what_is_asked_of_training_data(runner: TrialRunner, changes: dict[str, Any], marks: int) -> None:
+def test_what_is_asked_of_training_data(collected_grade: Grade, changes: dict[str, Any], marks: int) -> None:
     assignment = find_assignment("collect-shapes")
     criterion = assignment.criteria[1].model_copy(update={"each": 1, "marks": 4, "over": "share", **changes})
-    submission = read_submission(locate_examples("collect-shapes") / "reference", required_parts=assignment.parts)
-    assert grade(submission, replace(assignment, criteria=(criterion,)), runner=runner).marks == marks
+    (result,) = judge(replace(assignment, criteria=(criterion,)), collected_grade.trials)
+    assert result.marks == marks

@@ -17,6 +17,7 @@ from battery import run_text
 from responders.sandbox.isolation import Isolation
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.roles import ChildRole
+from rows import quick_first
 
 _DATA = """
 import numpy as np
@@ -76,7 +77,7 @@ def folder(empty: Path) -> Path:
     return empty
 
 
-@pytest.mark.parametrize("name", _MODELS)
+@pytest.mark.parametrize("name", quick_first(_MODELS, 3))
 def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
     _says(sandboxes, empty, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])
 
@@ -141,7 +142,7 @@ def test_it_works(text: str, expected_output: list[str], sandboxes: Sandboxes, f
     _says(sandboxes, folder, text, expected_output)
 
 
-@pytest.mark.parametrize("role", ["robot", "responder", "responder with libraries"])
+@pytest.mark.parametrize("role", quick_first(["robot", "responder with libraries", "responder"], 2))
 def test_the_standard_library_can_be_imported_late(role: ChildRole, sandboxes: Sandboxes, empty: Path) -> None:
     """Covers every importable module of the standard library, except those that draw or need a display."""
     left_out = {"antigravity", "this", "idlelib", "tkinter", "turtle", "turtledemo", "lib2to3", "ensurepip", "test"}

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from rows import quick_first
-
 #: Refuses one system call with one error, for itself and all its children, then runs the rest.
 _BEHIND = """
 import ctypes, struct, sys
@@ -93,7 +91,12 @@ def test_where_addresses_cannot_be_fixed_they_stand_without() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "word"), quick_first([(_CREATE, "Landlock"), (_SECCOMP, "seccomp"), (_PIDFD_OPEN, "pidfd_open")])
+    ("number", "word"),
+    [
+        (_CREATE, "Landlock"),
+        pytest.param(_SECCOMP, "seccomp", marks=pytest.mark.long),
+        pytest.param(_PIDFD_OPEN, "pidfd_open", marks=pytest.mark.long),
+    ],
 )
 def test_the_command_line_refuses(number: int, word: str, tmp_path: Path) -> None:
     program = tmp_path / "robot.py"

@@ -340,7 +340,8 @@ def _children() -> set[str]:
     ("misbehave", "cause", "run"),
     [
         *((*each, "little") for each in _ANYWHERE),
-        *((*each, "much") for each in (*_ANYWHERE, *_APART)),
+        *((*each, "much") for each in _APART),
+        *(pytest.param(*each, "much", marks=pytest.mark.long) for each in _ANYWHERE),
     ],
 )
 def test_a_criterion_that_cannot_be_judged_spoils_no_other(
