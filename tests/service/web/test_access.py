@@ -6,7 +6,7 @@ A route without a table row fails the test, and so does a table row without a ro
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from dataclasses import dataclass, replace
 
 import pytest
@@ -119,6 +119,20 @@ def test_programs_can_do_all_that_pages_do() -> None:
 
 @pytest.mark.parametrize("route", sorted(ROUTES))
 def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
+    """Everybody who may use a route, nobody, and one of the others, who are a different kind for the next route."""
+    allowed = ALLOWED[ROUTES[route].split(" ")[0]]
+    others = [who for who in READERS if who not in {"nobody", *allowed}]
+    number = sorted(ROUTES).index(route)
+    _check_readers(signed, route, {"nobody", *allowed, *others[number % len(others) :][:1]} if others else set(READERS))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("route", sorted(ROUTES))
+def test_nobody_else_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
+    _check_readers(signed, route, set(READERS))
+
+
+def _check_readers(signed: tuple[Web, Signed], route: str, readers: Set[str]) -> None:
     web, signed_requests = signed
     method, path = route.split(" ", 1)
     allowed = ALLOWED[ROUTES[route].split(" ")[0]]
@@ -126,7 +140,7 @@ def test_who_may_come_near(signed: tuple[Web, Signed], route: str) -> None:
     if "{upload_id}" in path:  # the deletion of a student removes the waiting uploads of the course
         values = {**values, "upload_id": create_upload(web, web.instructor())}
     # Readers without permission first: the others could end the objects.
-    for who in sorted(READERS, key=lambda each: each in allowed):
+    for who in sorted(readers, key=lambda each: (each in allowed, READERS.index(each))):
         answer = _ask(signed_requests, who, method, filled(path, values))
         if who in allowed:
             assert answer.status_code not in (401, 404, 403, 500), (who, answer.status_code, answer.text[-2000:])
