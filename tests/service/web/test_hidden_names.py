@@ -44,18 +44,29 @@ def grace(web: Web) -> Member:
     return web.instructor("grace")
 
 
+@pytest.fixture(scope="module")
+def regraded(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, str]:
+    """Return a database with a regrade of eight submissions, one per student, with names hidden."""
+    with web_in(tmp_path_factory.mktemp("home")) as web:
+        web.instructor("grace")
+        requests = [grading_request(who) for who in STUDENTS]
+        batch = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
+        _grade_all(web)
+        with web.store.transaction() as session:
+            open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
+            open_assignments.hide_names(session, 1, "echo-responder", True)
+        made = acting.regrade(web.store, batch.id, None, max_attempts=3, actor="grace")
+        _grade_all(web)
+    return (web.settings.home / "robomark.db").read_bytes(), made.batch_id
+
+
 @pytest.fixture
-def regrade(web: Web, grace: Member) -> str:
-    """Create a regrade of eight submissions, one per student, with names hidden."""
-    requests = [grading_request(who) for who in STUDENTS]
-    batch = intake.accept_batch(web.store, "week one", requests, (), course=COURSE, max_attempts=3)
-    _grade_all(web)
-    with web.store.transaction() as session:
-        open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
-        open_assignments.hide_names(session, 1, "echo-responder", True)
-    made = acting.regrade(web.store, batch.id, None, max_attempts=3, actor="grace")
-    _grade_all(web)
-    return made.batch_id
+def regrade(web: Web, grace: Member, regraded: tuple[bytes, str]) -> str:
+    """Use a copy of the database with the regrade. Grace is its first member, too."""
+    database, batch_id = regraded
+    web.store.engine.dispose()
+    (web.settings.home / "robomark.db").write_bytes(database)
+    return batch_id
 
 
 def _grade_all(web: Web) -> None:
