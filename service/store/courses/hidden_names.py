@@ -12,7 +12,7 @@ import hmac
 from dataclasses import dataclass
 from functools import lru_cache
 
-from sqlalchemy import select
+from sqlalchemy import exists, literal, select, union_all
 
 from service.store.courses.open_assignments import match_anonymous_assignments
 from service.store.engine import Store
@@ -75,14 +75,18 @@ NO_HIDDEN_NAMES = HiddenNames(frozenset(), b"")
 def load_hidden_names(store: Store, course_id: int) -> HiddenNames:
     """Return the hidden names of a course. Labels are keyed by the installation's secret, so they cannot be guessed."""
     own_secret = select(Installation.secret).scalar_subquery()
+    is_hidden = match_anonymous_assignments(course_id)
+    # One statement, because every page about such a course needs it: assignments have the number 0.
+    students_of_course = select(Enrolment.student, Enrolment.id, own_secret)
+    query = union_all(
+        select(OpenAssignment.assignment, literal(0).label("number"), own_secret).where(*is_hidden),
+        students_of_course.where(Enrolment.course_id == course_id, exists().where(*is_hidden)),
+    ).order_by("number")
     with store.reading() as session:
-        rows = session.execute(
-            select(OpenAssignment.assignment, own_secret).where(*match_anonymous_assignments(course_id))
-        ).all()
-        if not rows:
-            return NO_HIDDEN_NAMES
-        query = select(Enrolment.student).where(Enrolment.course_id == course_id).order_by(Enrolment.id)
-        students = tuple(session.scalars(query))
-    secret = store.secret or require_secret(rows[0][1])
+        rows = session.execute(query).all()
+    if not rows:
+        return NO_HIDDEN_NAMES
+    secret = store.secret or require_secret(rows[0][2])
     key = hmac.new(secret.text.encode("utf-8", "surrogateescape"), f"names {course_id}".encode(), hashlib.sha256)
-    return HiddenNames(frozenset(assignment for assignment, _ in rows), key.digest(), students)
+    assignments = frozenset(text for text, number, _ in rows if not number)
+    return HiddenNames(assignments, key.digest(), tuple(text for text, number, _ in rows if number))
