@@ -22,15 +22,7 @@ from service.store.courses.policies import ExceededLimit, OverLimit, PolicyLimit
 from service.store.engine import now
 from service.store.grades import appeals, current_grades, results
 from service.store.grades.appeals import AppealLine
-from service.store.states import (
-    UNFINISHED,
-    BatchState,
-    CancelReason,
-    CountedAttempt,
-    JobState,
-    PlotState,
-    Standing,
-)
+from service.store.states import UNFINISHED, BatchState, CancelReason, JobState, PlotState, Standing
 from service.store.tables.courses import AssignmentVersion
 from service.store.tables.submissions import Batch, Job, SubmissionRow
 
@@ -61,6 +53,7 @@ class OwnSubmission:
     plots: PlotState
     shown: bool  # its student may see its grade
     counts: bool  # its marks count for its assignment, and its student may know it
+    best_counts: bool  # the best attempt counts in its course, instead of the latest
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
     max_marks: Decimal | None = None
@@ -73,10 +66,9 @@ class OwnSubmission:
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """A student's remaining attempts and time for an assignment, and the course's rule for the attempt that counts."""
+    """A student's remaining attempts and time for an assignment."""
 
     limits: PolicyLimits
-    counted_attempt: CountedAttempt
     attempts_made: int
     left: timedelta | None  # until the student's due date; negative after it, None without one
     late_left: timedelta | None  # until late submissions stop counting
@@ -213,11 +205,9 @@ def compute_allowances(session: Session, enrolment_id: int, assignments: Collect
     """Return ``allowance`` for several assignments, with the same number of statements."""
     limits, current_time = policies.load_limits_by_assignment(session, enrolment_id, assignments), now(session)
     attempt_counts = policies.count_attempts(session, enrolment_id, assignments)
-    counted_attempt = policies.load_counted_attempt(session, enrolment_id)
     return {
         each: Allowance(
             limits[each],
-            counted_attempt,
             attempt_counts[each],
             None if (due_at := limits[each].due_at) is None else due_at - current_time,
             None if (closed_at := limits[each].closed_at) is None else closed_at - current_time,
@@ -226,7 +216,7 @@ def compute_allowances(session: Session, enrolment_id: int, assignments: Collect
     }
 
 
-_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool, str | None]
+_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool, bool, str | None]
 
 
 def _select_attempts(
@@ -287,6 +277,7 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
             same_attempt,
             and_(*current_grades.CAN_COUNT),
             and_(_is_counting(enrolment_id), or_(~is_best, select_unpublished("hidden", "after_published").is_(None))),
+            is_best,
             case((is_best, select_unpublished("after_due_date"))),
         )
         .join(Job, Job.submission_id == SubmissionRow.id)
@@ -303,9 +294,9 @@ def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSub
     otherwise be found by comparing attempts.
     """
     rows = session.execute(query).all()
-    submissions = [_build_submission(*row[:7]) for row in rows]
+    submissions = [_build_submission(*row[:8]) for row in rows]
     visible_job_ids = [each.job_id for each in submissions if each.shown]
-    due_job_ids = {row[7] for row in rows if row[7] is not None}
+    due_job_ids = {row[8] for row in rows if row[8] is not None}
     grades_by_job, visibilities_by_job = (
         results.load_marks(session, visible_job_ids),
         policies.load_visibilities_by_job(session, {*visible_job_ids, *due_job_ids}),
@@ -313,7 +304,7 @@ def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSub
     undecided = {
         submission.id
         for submission, row in zip(submissions, rows, strict=True)
-        if row[7] is not None and "after_due_date" not in visibilities_by_job[row[7]]
+        if row[8] is not None and "after_due_date" not in visibilities_by_job[row[8]]
     }
     submissions = [replace(each, counts=False) if each.id in undecided else each for each in submissions]
     return [
@@ -337,6 +328,7 @@ def _build_submission(
     same_as: int | None,
     is_shown: bool,
     counts: bool,
+    best_counts: bool,
 ) -> OwnSubmission:
     return OwnSubmission(
         id=row.id,
@@ -358,6 +350,7 @@ def _build_submission(
         plots=job.plots,
         shown=is_shown,
         counts=counts,
+        best_counts=best_counts,
     )
 
 

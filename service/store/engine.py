@@ -15,7 +15,7 @@ from functools import wraps
 from pathlib import Path
 from typing import ParamSpec, Self, TypeVar
 
-from sqlalchemy import Engine, create_engine, event, func, make_url, select
+from sqlalchemy import ColumnElement, Engine, create_engine, event, func, literal, make_url, select
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import DBAPIError, NoResultFound, OperationalError
 from sqlalchemy.orm import Session
@@ -24,6 +24,7 @@ from sqlalchemy.pool import NullPool
 
 from service.home import open_home
 from service.settings import Settings
+from service.store.columns import UtcDateTime
 from service.store.migrate import upgrade_database
 from service.store.revision import load_schema_state
 from sim.errors import HostError
@@ -32,6 +33,7 @@ from submissions.seeds import Secret
 SQLITE_BUSY_SECONDS = 30
 IMPATIENT_SECONDS = 0.5
 _ONLY_READS = "robomark_only_reads"
+_READ_AT = "robomark_read_at"
 _BUSY_SECONDS = "robomark_busy_seconds"
 #: SQLSTATE of transactions that PostgreSQL aborted because of another: deadlock, serialization failure.
 _CONFLICTS = ("40P01", "40001")
@@ -92,9 +94,9 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """Open a read-only transaction; on SQLite it does not block writers."""
+        """Open a read-only transaction; on SQLite it does not block writers. Its clock stands still."""
         engine = self.engine.execution_options(**{_ONLY_READS: True})
-        with Session(engine, expire_on_commit=False) as session, session.begin():
+        with Session(engine, expire_on_commit=False, info={_ONLY_READS: True}) as session, session.begin():
             yield session
 
     def with_short_wait(self) -> Store:
@@ -182,9 +184,22 @@ def open_store(settings: Settings) -> Store:
 
 
 def now(session: Session) -> datetime:
-    """Return the database's clock, so that leases agree on every machine; for SQLite, this machine's clock."""
-    if session.get_bind().dialect.name == "sqlite":
-        return datetime.now(UTC)
-    moment = session.scalars(select(func.clock_timestamp())).one()
+    """Return the database's clock, so that leases agree on every machine; for SQLite, this machine's clock.
+
+    A transaction that only reads asks for it once. Others may have waited for a lock since they last asked.
+    """
+    moment = session.info.get(_READ_AT)
+    if moment is None:
+        is_sqlite = session.get_bind().dialect.name == "sqlite"
+        moment = datetime.now(UTC) if is_sqlite else session.scalars(select(select_clock(session))).one()
+        if session.info.get(_ONLY_READS):
+            session.info[_READ_AT] = moment
     assert isinstance(moment, datetime)
-    return moment.astimezone(UTC)
+    return moment
+
+
+def select_clock(session: Session) -> ColumnElement[datetime]:
+    """Return the clock of ``now`` as an expression, for statements that read it with rows or compare it with them."""
+    if session.get_bind().dialect.name == "sqlite":
+        return literal(datetime.now(UTC), UtcDateTime())
+    return func.clock_timestamp(type_=UtcDateTime())

@@ -199,12 +199,6 @@ def load_policies(session: Session, course_id: int) -> dict[str, PolicyLimits]:
     return {row.assignment: _build_limits(row) for row in rows}
 
 
-def load_counted_attempt(session: Session, enrolment_id: int) -> CountedAttempt:
-    """Return the rule of a student's course for the attempt that counts."""
-    query = select(Course.counted_attempt).join(Enrolment, Enrolment.course_id == Course.id)
-    return session.scalars(query.where(Enrolment.id == enrolment_id)).one()
-
-
 def match_best_counts() -> ColumnElement[bool]:
     """Return the condition that the best attempt counts in the course of a ``SubmissionRow``."""
     best_course = exists().where(

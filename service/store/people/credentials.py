@@ -17,7 +17,7 @@ from sqlalchemy import and_, delete, func, select, true, update
 from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
-from service.store.engine import now
+from service.store.engine import now, select_clock
 from service.store.ids import generate_id
 from service.store.people.reach import (
     UNLIMITED_REACH,
@@ -264,10 +264,11 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
         return None
     reach = build_reach(row)
     reach_conditions = match_reached_enrolments(reach)
-    query = select(Person.operator, Enrolment, and_(*reach_conditions) if reach_conditions else true())
+    is_reached = and_(*reach_conditions) if reach_conditions else true()
+    query = select(Person.operator, Enrolment, is_reached, select_clock(session))
     query = query.outerjoin(Enrolment, Enrolment.person_id == Person.id).where(Person.id == row.person_id)
     enrolment_rows = session.execute(query.order_by(Enrolment.role != Role.INSTRUCTOR, Enrolment.id)).all()
-    enrolments = [(enrolment, is_reached) for _, enrolment, is_reached in enrolment_rows if enrolment is not None]
+    enrolments = [(enrolment, is_reached) for _, enrolment, is_reached, _ in enrolment_rows if enrolment is not None]
     own_enrolments = [each for each, _ in enrolments if row.course_id in (None, each.course_id)]
     return Identity(
         row.id,
@@ -277,7 +278,7 @@ def identify(session: Session, secret: str, kind: CredentialKind) -> Identity | 
         {each.course_id: each.role for each, is_reached in enrolments if is_reached},
         None if kind is CredentialKind.SESSION and not reach.scopes else reach.scopes,
         reach,
-        row.used_at is not None and row.used_at >= now(session) - _USE_INTERVAL,
+        row.used_at is not None and row.used_at >= enrolment_rows[0][3] - _USE_INTERVAL,
     )
 
 
@@ -340,7 +341,7 @@ def _find_valid(session: Session, secret: str, kind: CredentialKind) -> Credenti
     if not secret.startswith(_PREFIXES[kind]) or len(secret) > 100:
         return None
     conditions = (Credential.sha256 == _hash_secret(secret), Credential.kind == kind)
-    return session.scalar(select(Credential).where(*conditions, *match_valid(now(session))))
+    return session.scalar(select(Credential).where(*conditions, *match_valid(select_clock(session))))
 
 
 def _build_row(

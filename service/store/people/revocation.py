@@ -14,7 +14,7 @@ from service.store.states import CredentialKind
 from service.store.tables.people import Credential
 
 
-def match_valid(current_time: datetime) -> tuple[ColumnElement[bool], ...]:
+def match_valid(current_time: datetime | ColumnElement[datetime]) -> tuple[ColumnElement[bool], ...]:
     """Return the conditions on a ``Credential`` that can still be used."""
     is_unused = or_(Credential.kind != CredentialKind.LINK, Credential.used_at.is_(None))
     return Credential.revoked_at.is_(None), Credential.expires_at > current_time, is_unused, ~_match_revoked_parent()

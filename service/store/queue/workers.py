@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 from sqlalchemy import BindParameter, ColumnElement, delete, select
 from sqlalchemy.orm import Session
 
-from service.store.engine import Store, now, retry_conflicts
+from service.store.engine import Store, now, retry_conflicts, select_clock
 from service.store.tables.installation import Heartbeat, Worker
 
 #: A worker with a heartbeat within this time is considered alive.
@@ -75,8 +75,7 @@ def delete_heartbeat(store: Store, name: str) -> None:
 
 def load_workers(session: Session) -> list[WorkerLine]:
     """Return all workers with a heartbeat, ordered by name."""
-    current_time = now(session)
-    rows = session.scalars(select(Heartbeat).order_by(Heartbeat.worker))
+    rows = session.execute(select(Heartbeat, select_clock(session)).order_by(Heartbeat.worker)).all()
     return [
         WorkerLine(
             WorkerDescription(
@@ -86,7 +85,7 @@ def load_workers(session: Session) -> list[WorkerLine]:
             row.seen_at,
             row.seen_at > current_time - ALIVE_PERIOD,
         )
-        for row in rows
+        for row, current_time in rows
     ]
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
-from sqlalchemy import update
+from sqlalchemy import select, update
 
 import report_builders
 from builders import accept_one, prepared
@@ -14,7 +14,7 @@ from service.queue.celery_app import make_celery
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import phases
-from service.store.engine import Store
+from service.store.engine import Store, now, select_clock
 from service.store.grades import plots
 from service.store.queue import jobs, metrics, workers
 from service.store.queue.jobs import RetryPolicy
@@ -102,3 +102,16 @@ def test_a_notice_that_could_not_be_given_is_not_remembered_as_given(store: Stor
     away = service_settings.with_broker(f"redis+socket://{service_settings.home / 'nothing.sock'}")
     Notifier(make_celery(away), store, away).grade(JobQueue.INTERACTIVE)
     assert _job(store, job_id).notified_at is None
+
+
+def test_the_clock_stands_still_only_for_transactions_that_read(store: Store) -> None:
+    with store.reading() as session:
+        read_at = now(session)
+        assert now(session) == read_at
+        clock = session.scalars(select(select_clock(session))).one()
+        assert read_at <= clock <= read_at + HOUR
+    with store.transaction() as session:
+        moments = [now(session) for _ in range(2)]
+        while moments[-1] == moments[0]:
+            moments.append(now(session))
+        assert sorted(moments) == moments

@@ -12,6 +12,7 @@ import pytest
 from sqlalchemy import event
 from starlette.testclient import TestClient
 
+from benchmarks.harness.postgresql_server import create_database
 from crowded_world import crowd
 from paths import DATA
 from service.store.engine import Store
@@ -41,8 +42,13 @@ _NO_STATEMENT = re.compile("BEGIN|PRAGMA")
 
 
 @pytest.mark.long
-def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(tmp_path: Path) -> None:
-    with web_in(tmp_path) as web:
+@pytest.mark.parametrize("database", ["sqlite", "postgresql"])
+def test_no_route_needs_many_statements_or_more_of_them_the_more_there_is(
+    tmp_path: Path, request: pytest.FixtureRequest, database: str
+) -> None:
+    is_sqlite = database == "sqlite"
+    url = "" if is_sqlite else create_database(request.getfixturevalue("postgresql"))
+    with web_in(tmp_path, database_url=url) as web:
         world = make_world(web)
         plots.store_plots(web.store, world.values["job_id"], {"path": b"PNG"})
         browsers, tokens = _sign_in(web, world)
