@@ -97,6 +97,12 @@ _REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "zip, many entries": (partial(_open, _zip_of(101)), "zipfile.ZipFile.__init__"),
     "zip, a stored zip in it": (partial(_open, _zip_of(1, _zip_of(101))), "zipfile.ZipFile.__init__"),
     "python, many tokens": (lambda: parse_module("0;" * 300_000), "ast.parse"),
+    "python, dotted import": (lambda: parse_module("import a" + ".a" * 20_000), "ast.parse"),
+    "python, dotted import with blanks": (
+        lambda: parse_module("from a" + " .\\\n\u0061\u0301" * 200 + " import b"),
+        "ast.parse",
+    ),
+    "python, long f-string": (lambda: parse_module("f'" + "{a}" * 60_000 + "'"), "ast.parse"),
     "image, many scans": (partial(read_image, _jpeg_of_many_scans(), 64, 64), "PIL.Image.Image.convert"),
     "image, another size": (
         lambda: read_image(_png_that_claims(60_000, 60_000), 64, 64),
