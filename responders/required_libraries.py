@@ -17,7 +17,7 @@ from sim.readers.python_source import parse_module
 from sim.readers.reader_errors import UnreadableDataError
 
 _LOADED_MODULES = ("nbev3devsim.load_nbev3devwidget", "inside.static_analysis.reader")
-#: Maximum number of characters per text, because parsing longer texts is slow.
+#: Maximum number of characters of a module and those beside it, because parsing longer texts is slow.
 _MAX_CHARACTERS = 60_000
 #: Names that give access to loaded modules, to code outside the syntax trees, or to garbage collection; and course
 #: modules that need libraries.
@@ -43,7 +43,14 @@ def may_need_libraries(text: str, files: Mapping[str, bytes]) -> bool:
         texts = (text, *(data.decode() for data in modules.values()))
     except UnicodeDecodeError:
         return True
-    known_modules = {*modules, *STANDARD_MODULES, *_LOADED_MODULES}
+    return _may_import_libraries(texts, frozenset((*modules, *STANDARD_MODULES, *_LOADED_MODULES)))
+
+
+@functools.lru_cache(maxsize=64)
+def _may_import_libraries(texts: tuple[str, ...], known_modules: frozenset[str]) -> bool:
+    """Return whether the modules may import others than the known ones. Parses each submission once for all trials."""
+    if sum(map(len, texts)) > _MAX_CHARACTERS:
+        return True
     return any(
         (imported_names := _find_imports(each)) is None or not known_modules.issuperset(imported_names)
         for each in texts
@@ -55,11 +62,8 @@ def build_notebook_source(cells: tuple[str, ...]) -> str:
     return "\n".join(_HARMLESS_LINE.sub("pass", cell) for cell in cells if not _ROBOT_CELL.match(cell))
 
 
-@functools.lru_cache(maxsize=64)
 def _find_imports(text: str) -> frozenset[str] | None:
-    """Return all names that a text imports, or None if that is unknown. Parses each distinct text once."""
-    if len(text) > _MAX_CHARACTERS:
-        return None
+    """Return all names that a text imports, or None if that is unknown."""
     try:
         nodes = list(ast.walk(parse_module(text)))
     except (SyntaxError, UnreadableDataError):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import json
 
 import pytest
 
+import responders.required_libraries
 import responders.trial_spec
 from responders.function_calls import FunctionCall
 from responders.required_libraries import build_notebook_source, may_need_libraries
@@ -92,6 +94,22 @@ def test_who_may_need_one(name: str) -> None:
 )
 def test_the_files_beside_it_count(files: dict[str, bytes]) -> None:
     assert may_need_libraries("pass", files)
+
+
+def test_many_modules_are_parsed_once_and_long_ones_never(monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed_texts: list[str] = []
+
+    def parse(text: str) -> ast.Module:
+        parsed_texts.append(text)
+        return ast.parse(text)
+
+    monkeypatch.setattr(responders.required_libraries, "parse_module", parse)
+    short_files = {f"m{number}.py": f"x = {number}".encode() for number in range(100)}
+    assert [may_need_libraries("pass", short_files) for _ in range(3)] == [False] * 3
+    assert len(parsed_texts) == 101
+    long_files = {name: data + b"\n" + b"a;" * 500 for name, data in short_files.items()}
+    assert may_need_libraries("pass", long_files)
+    assert len(parsed_texts) == 101
 
 
 def test_the_robots_of_a_notebook_do_not_count() -> None:
