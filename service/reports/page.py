@@ -6,6 +6,7 @@ Nothing is escaped or hidden here: the input is already the reader's view.
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -235,11 +236,14 @@ def build_timeline(recording: Recording, language: Language = ENGLISH) -> tuple[
         moments += [(fault.t, _classify_fault(fault), prefix + fault.message) for fault in robot_recording.faults]
     moments.sort(key=lambda moment: moment[0])
     omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
-    entries = [_build_entry(t, kind, text, language) for t, kind, text in moments]
     if omitted <= 1:
-        return tuple(entries)
+        return tuple(_build_entry(*moment, language) for moment in moments)
+    first, last = (
+        [_build_entry(*moment, language) for moment in shown_moments]
+        for shown_moments in (moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:])
+    )
     gap = language.say("%(count)s more entries are not shown", count=language.format_integer(omitted))
-    return (*entries[:_TIMELINE_FIRST], TimelineEntry("", "", "", gap), *entries[-_TIMELINE_LAST:])
+    return (*first, TimelineEntry("", "", "", gap), *last)
 
 
 def _classify_fault(fault: Fault) -> str:
@@ -302,14 +306,15 @@ def _build_scene(grade: Grade, scenario: str, plots: tuple[Plot, ...], language:
     index = find_worst_trial(grade, scenario)
     trial = grade.trials[index]
     recording = trial.recording
-    lines = tuple(_build_message_lines(recording, language))
+    # A trial can have a hundred thousand messages, of which few are shown.
+    lines = tuple(itertools.islice(_build_message_lines(recording, language), _MAX_MESSAGES))
     has_several_trials = len(grade.trials) > 1
     return Scene(
         where=f": {format_trial_name(trial, language, 80)}" if has_several_trials else "",
         plots=tuple(plot for plot in plots if plot.scenario == scenario),
         timeline=build_timeline(recording, language),
-        messages=lines[:_MAX_MESSAGES],
-        more_messages=max(0, len(lines) - _MAX_MESSAGES),
+        messages=lines,
+        more_messages=_count_message_lines(recording) - len(lines),
         talk=describe_message_counts(count_messages(recording), language),
         outputs=tuple(each for each in _collect_outputs(recording, language) if each.text),
         notes=(
@@ -360,6 +365,18 @@ def _build_message_lines(recording: Recording, language: Language) -> Iterator[M
         if recording.partner is None:
             steps = itertools.islice(iterate_inner_steps(recording, index), MAX_CALL_STEPS)
             yield from (_build_inner_line(step, language) for step in steps)
+
+
+def _count_message_lines(recording: Recording) -> int:
+    """Return the number of lines that ``_build_message_lines`` yields, without building them."""
+    inner_counts = Counter({-1: 0})
+    for call in recording.calls:
+        inner_counts[call.message] += 1 + (call.result != "None")  # a logger returns nothing
+    inner_counts.update(agent_message.message for agent_message in recording.agent_messages)
+    count = len(collect_messages(recording)) + inner_counts.pop(-1)
+    if recording.partner is None:
+        count += sum(min(inner_count, MAX_CALL_STEPS) for inner_count in inner_counts.values())
+    return count
 
 
 def _build_inner_line(step: Step, language: Language) -> MessageLine:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -21,7 +23,7 @@ from service.reports.message_losses import describe_loss_fully, describe_note
 from service.reports.replay.sources import Place, Sources
 from service.reports.robots import PARTNER_OF, iterate_robots, select_answering_party
 from service.reports.verdict_sentences import describe_verdict, format_trial_name
-from sim.recording import COLUMNS, SECOND, Image, Pose, Recording, Ticks, Verdict
+from sim.recording import COLUMNS, SECOND, AgentMessage, Image, Message, Pose, Recording, Ticks, Verdict
 from sim.recording_values import collect_printed_lines, get_pose_at, get_recorded_robot
 from sim.robot import LightSensor
 
@@ -75,8 +77,7 @@ def trial_to_json(
     """Return all data of a trial except its floor. ``index`` is its index in the evidence of the ``criteria``."""
     recording = trial.recording
     events, omitted_count = _collect_events(recording, sources, language)
-    messages = sorted(_iterate_messages(recording, sources, language), key=lambda message: message["t"])
-    omitted_count += max(0, len(messages) - _MAX_EVENTS)
+    messages, omitted_messages = _collect_messages(recording, sources, language)
     predictions = [each for result in criteria for each in result.predictions if each.trial == index]
     return {
         "trial": index + 1,
@@ -88,9 +89,9 @@ def trial_to_json(
         "obstacles": recording.obstacles,
         "beacon": recording.beacon,
         "robots": [_robot_to_json(name, own, predictions) for name, own in iterate_robots(recording)],
-        "messages": messages[:_MAX_EVENTS],
+        "messages": messages,
         "events": events,
-        "left_out": omitted_count,
+        "left_out": omitted_count + omitted_messages,
         "lost": _collect_losses(recording, criteria, index),
     }
 
@@ -218,40 +219,54 @@ def _place_to_json(place: Place | None) -> dict[str, Any]:
     return {} if place is None else {"line": [place.source, place.line]}
 
 
-def _iterate_messages(recording: Recording, sources: Sources, language: Language) -> Iterator[dict[str, Any]]:
-    """Yield every message, with what the receiver got and when."""
+def _collect_messages(recording: Recording, sources: Sources, language: Language) -> tuple[list[dict[str, Any]], int]:
+    """Return the messages by time, with what the receiver got and when, and how many are left out."""
+    builders: list[tuple[float, Callable[[], dict[str, Any]]]] = []
     for robot, robot_recording in iterate_robots(recording):
         responder = select_answering_party(robot_recording)
         other_party = PARTNER_OF[robot] if recording.partner is not None else responder
+        writing_sources = sources if robot_recording is recording else None
         for message in robot_recording.messages:
             if message.sender == "partner":
                 continue  # the other robot's list has it
-            from_robot = message.sender == "robot"
             receiver = other_party if message.to_partner or recording.partner is None else responder
-            data: dict[str, Any] = {
-                "t": message.t,
-                "from": robot if from_robot else responder,
-                "to": receiver if from_robot else robot,
-                "text": abbreviate_message(message.text, _MAX_TEXT_LENGTH),
-                "arrived": message.delivered,
-            }
-            if message.arrived_as is not None:
-                data["arrived_as"] = abbreviate_message(message.arrived_as, _MAX_TEXT_LENGTH)
-            loss_text = describe_loss_fully(message, language)
-            if loss_text:
-                data["befell"] = loss_text
-            if from_robot and robot_recording is recording:
-                data |= _place_to_json(sources.find_writing_line(message.text))
-            yield data
-    for agent_message in recording.agent_messages:
-        data = {
-            "t": agent_message.t,
-            "from": to_one_line(agent_message.sender, 60),
-            "to": to_one_line(agent_message.receiver, 60),
-            "text": abbreviate_message(agent_message.text, _MAX_TEXT_LENGTH),
-            "arrived": None if agent_message.note else agent_message.t,
-        }
-        yield {**data, "befell": describe_note(agent_message.note, language)} if agent_message.note else data
+            parties = (robot, receiver) if message.sender == "robot" else (responder, robot)
+            builders.append((message.t, partial(_message_to_json, message, *parties, writing_sources, language)))
+    builders += [(each.t, partial(_agent_message_to_json, each, language)) for each in recording.agent_messages]
+    # A trial can have a hundred thousand messages.
+    builders.sort(key=itemgetter(0))
+    return [build() for _, build in builders[:_MAX_EVENTS]], max(0, len(builders) - _MAX_EVENTS)
+
+
+def _message_to_json(
+    message: Message, sender: str, receiver: str, sources: Sources | None, language: Language
+) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "t": message.t,
+        "from": sender,
+        "to": receiver,
+        "text": abbreviate_message(message.text, _MAX_TEXT_LENGTH),
+        "arrived": message.delivered,
+    }
+    if message.arrived_as is not None:
+        data["arrived_as"] = abbreviate_message(message.arrived_as, _MAX_TEXT_LENGTH)
+    loss_text = describe_loss_fully(message, language)
+    if loss_text:
+        data["befell"] = loss_text
+    if message.sender == "robot" and sources is not None:
+        data |= _place_to_json(sources.find_writing_line(message.text))
+    return data
+
+
+def _agent_message_to_json(message: AgentMessage, language: Language) -> dict[str, Any]:
+    data = {
+        "t": message.t,
+        "from": to_one_line(message.sender, 60),
+        "to": to_one_line(message.receiver, 60),
+        "text": abbreviate_message(message.text, _MAX_TEXT_LENGTH),
+        "arrived": None if message.note else message.t,
+    }
+    return {**data, "befell": describe_note(message.note, language)} if message.note else data
 
 
 def _collect_losses(recording: Recording, criteria: Sequence[CriterionResult], index: int) -> list[dict[str, Any]]:

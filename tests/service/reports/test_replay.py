@@ -231,12 +231,19 @@ def test_hostile_texts_are_visible_and_capped() -> None:
     assert len(compress_replay(data_of(page))) < 100_000
 
 
-def test_a_flood_of_messages_is_cut_and_counted() -> None:
+def test_a_flood_of_messages_is_cut_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+
+    def abbreviate(text: str, limit: int) -> str:
+        texts.append(text)
+        return text[:limit]
+
+    monkeypatch.setattr("service.reports.replay.trial.abbreviate_message", abbreviate)
     flood = tuple(Message(index / 1000, "robot", f"PY::{index}", None) for index in range(5000))
     (trial,) = build_run_replay(replace(build.line_follower_recording(3), messages=flood), "r", 0, Sources(), {})[
         "trials"
     ]
-    assert (len(trial["messages"]), trial["left_out"]) == (2000, 3000)
+    assert (len(trial["messages"]), trial["left_out"], len(texts)) == (2000, 3000, 2000)
 
 
 def test_both_robots_are_there_and_say_who_they_are() -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 import report_builders as build
 from service.grading.grade import Accuracy, TrialResult
-from service.reports.page import build_page
+from service.reports.page import Scene, build_page
 from service.reports.plots.confusion import build_confusion_table, draw_confusion
 from service.reports.plots.diagram_drawing import draw_diagram
 from service.reports.plots.diagram_parts import Highlights
@@ -25,7 +25,7 @@ from service.reports.plots.sensor_images import crop_focus, select_predictions, 
 from service.reports.plots.sequence import Gap, Step, build_conversation
 from service.reports.plots.style import WIDTH
 from service.reports.view import build_staff_view
-from sim.recording import Call, Message, Pose, Recording
+from sim.recording import Call, Message, Pose, Recording, TimedText
 
 
 def _texts(figure: Figure) -> list[str]:
@@ -237,6 +237,36 @@ def test_long_conversations_are_cut_but_keep_what_went_wrong() -> None:
     trial = TrialResult("a", 0, 1, 0, 0, "visible", _talk(*messages))
     (scene,) = build_page(build_staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes
     assert (len(scene.messages), scene.more_messages) == (40, 40)
+
+
+def test_of_many_messages_and_events_a_page_makes_only_those_that_it_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    messages = [
+        Message(float(count), sender, f"PY::{count}", float(count), note="duplicated")
+        for count in range(3000)
+        for sender in ("robot", "responder")
+    ]
+    results = ("None", "1", "2")
+    calls = tuple(Call(-1 + count // 2, 0, "responder", "parser", "", results[count % 3]) for count in range(1000))
+    recording = replace(_talk(*messages, calls=calls), printed=tuple(TimedText(float(t), str(t)) for t in range(3000)))
+    monkeypatch.setattr("service.reports.page._MAX_MESSAGES", 100_000)
+    all_lines = len(_build_scene(recording).messages)
+    monkeypatch.setattr("service.reports.page._MAX_MESSAGES", 40)
+    texts: list[str] = []
+
+    def note(text: str, *_: object, **__: object) -> str:
+        texts.append(text)
+        return ""
+
+    for name in ("abbreviate_message", "to_display_text"):
+        monkeypatch.setattr(f"service.reports.page.{name}", note)
+    scene = _build_scene(recording)
+    assert (len(scene.messages), scene.more_messages) == (40, all_lines - 40)
+    assert len(texts) < 200
+
+
+def _build_scene(recording: Recording) -> Scene:
+    trial = TrialResult("a", 0, 1, 0, 0, "visible", recording)
+    return build_page(build_staff_view(replace(build.faulty_grade(), trials=(trial,), criteria=()))).scenes[0]
 
 
 def test_answers_to_nothing_and_strange_indices_are_shown_too() -> None:
