@@ -116,6 +116,7 @@ class OwnAssignment:
     assignment: str
     title: str
     open: bool
+    closed: bool  # it was open, and no longer is
     allowance: Allowance
     newest: OwnSubmission | None
     counting: OwnSubmission | None  # the one whose marks count
@@ -141,6 +142,7 @@ def load_own_assignments(session: Session, course_id: int, enrolment_id: int) ->
     course_assignments = open_assignments.list_assignments(session, course_id)
     titles = {each.assignment: each.title for each in course_assignments if each.open}
     is_open = frozenset(titles)
+    is_closed = frozenset(each.assignment for each in course_assignments if each.closed_at is not None)
     titles = {name: each.title for name, each in newest_submissions.items()} | titles
     allowances = compute_allowances(session, enrolment_id, titles)
     lines = [
@@ -148,6 +150,7 @@ def load_own_assignments(session: Session, course_id: int, enrolment_id: int) ->
             name,
             title,
             name in is_open,
+            name in is_closed,
             allowances[name],
             newest_submissions.get(name),
             counting_submissions.get(name),

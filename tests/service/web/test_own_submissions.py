@@ -16,7 +16,8 @@ from sqlalchemy import update
 from starlette.testclient import TestClient
 
 import report_builders
-from builders import PROGRAM, echo, prepared
+from builders import PROGRAM, echo, grading_request, prepared
+from service.store.batches import intake
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
@@ -26,7 +27,7 @@ from service.store.queue.workers import WorkerDescription
 from service.store.states import JobState
 from service.store.tables.submissions import Job
 from submissions.assignment.definition import Assignment
-from web import Web, submit, web_in
+from web import COURSE, Web, submit, web_in, words
 
 RESPONDER = "def responder(msg):\n    return msg\n"
 MINE = "/courses/1/mine"
@@ -93,6 +94,19 @@ def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) 
     for name in ("prepared", "closed", "no-such", "submissions"):
         assert browser.get(f"{MINE}/{name}").status_code == 404
         assert _send(browser, path=f"{MINE}/{name}").status_code == 404
+
+
+def test_the_list_has_closed_assignments_and_those_of_batches_with_their_grades(web: Web, ada: Member) -> None:
+    for name in ("closed", "of a batch"):
+        request = grading_request(ada.id, assignment=_assignment(name))
+        intake.accept_batch(web.store, name, [request], (), course=COURSE, max_attempts=3)
+    _grade(web)
+    answer = web.browser(ada).get(MINE)
+    assert answer.status_code == 200
+    listed = words(answer.text)
+    assert listed.count("Current grade:") == 2
+    assert "About closed closed" in listed
+    assert listed.count("closed closed") == 1
 
 
 def test_a_task_tells_nothing_that_is_hidden_and_gives_what_is_given(web: Web, ada: Member) -> None:
