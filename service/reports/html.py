@@ -27,6 +27,7 @@ from service.grading.ranks import RankTable
 from service.language import ENGLISH, Language
 from service.reports.display_text import format_decimal, to_display_text
 from service.reports.page import build_page
+from service.reports.plots.grade_plots import draw_vector_plots
 from service.reports.plots.plot import DPI
 from service.reports.replay.document import REPORT_BYTES, Pixels, build_grade_replay, compress_replay
 from service.reports.replay.labels import translate_labels
@@ -42,6 +43,7 @@ _log = logging.getLogger(__name__)
 #: The expected form of a submission, for rejections that don't state it.
 _EXPECTED_FORM = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
 _CSS_PIXELS = 100 / DPI
+_SAFE_IN_URIS = " !$'()*+,-./:;=?@_~"  # in a data URI that is a quoted attribute
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -110,12 +112,14 @@ def render_report_parts(
 
     Args:
         view: The grade as its reader may see it.
-        plots: The result of ``draw_all_plots``. Missing plots are left out.
+        plots: The result of ``draw_all_plots``. Missing ones are left out, except those that the report shows as SVG:
+            these are always drawn from the grade.
         submission: The submission, for its source.
         own_floors: Floors that are not built in, by name.
         overlay_trials: Trials to draw over those of the replay.
     """
     images = {name: ShownImage(_to_data_uri(data), *_compute_display_size(data)) for name, data in plots.items()}
+    images |= {name: _build_vector_image(text) for name, text in draw_vector_plots(view.grade, own_floors).items()}
     replay = (
         build_grade_replay(view, submission, own_floors, REPORT_BYTES, overlay_trials) if view.grade.trials else None
     )
@@ -295,6 +299,14 @@ def _make_readable(value: object) -> object:
 
 def _to_data_uri(data: bytes) -> Markup:
     return Markup("data:image/png;base64,") + Markup(base64.b64encode(data).decode("ascii"))
+
+
+def _build_vector_image(document: str) -> ShownImage:
+    """Return an SVG document as an image of its own size. As text it is a fifth smaller than in base64."""
+    size = re.match(r"<svg [^>]*?width='(\d+)' height='(\d+)'", document)
+    width, height = map(int, size.groups()) if size else (0, 0)
+    uri = Markup("data:image/svg+xml,") + Markup(quote(document, safe=_SAFE_IN_URIS))
+    return ShownImage(uri, width, height)
 
 
 def _compute_display_size(image: bytes) -> tuple[int, int]:

@@ -135,13 +135,14 @@ def write_report(folder: Path, grade: Grade, submission: Submission, student_nam
     """Draw the plots of a grade and write the report, named after the student as ``student_name``. Return its path."""
     from service.reports.html import render_or_explain, render_report_page
     from service.reports.plots.grade_plots import draw_all_plots
+    from service.reports.plots.plot import VECTOR_KINDS
     from service.reports.view import build_student_view
     from submissions.diagram_cells import read_diagrams
 
     view = build_student_view(grade, language=language)
 
     def render() -> str:
-        plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells)
+        plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells, omitted_kinds=VECTOR_KINDS)
         return render_report_page(view, plots, submission)
 
     return write_page(folder, f"{build_file_stem(student_name)}.html", render_or_explain(view, render))

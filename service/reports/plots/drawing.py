@@ -1,6 +1,7 @@
 """A drawing as a list of lines, areas, marks, images and texts, in inches from its lower left corner.
 
-``panel.py`` draws data with axes on it, and ``raster.py`` turns it into pixels. Later items cover earlier ones.
+``panel.py`` draws data with axes on it. ``raster.py`` turns it into pixels, and ``svg.py`` into an SVG document. Later
+items cover earlier ones.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ Points = NDArray[np.float64]
 Horizontal = Literal["left", "center", "right"]
 #: ``middle`` is the middle of capitals and digits, ``center`` that of the whole line.
 Vertical = Literal["baseline", "top", "center", "middle", "bottom"]
+_SLACK = 1e-6  # inches
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,24 @@ class Rectangle:
         """The four corners, counter-clockwise from the lower left one."""
         right, top = self.left + self.width, self.bottom + self.height
         return np.array([(self.left, self.bottom), (right, self.bottom), (right, top), (self.left, top)])
+
+    def cut(self, clip: Rectangle | None) -> Rectangle:
+        """Return the part inside ``clip``, which can be empty; all of it without one."""
+        if clip is None:
+            return self
+        left, bottom = max(self.left, clip.left), max(self.bottom, clip.bottom)
+        right = min(self.left + self.width, clip.left + clip.width)
+        top = min(self.bottom + self.height, clip.bottom + clip.height)
+        return Rectangle(left, bottom, max(0.0, right - left), max(0.0, top - bottom))
+
+    def contains(self, other: Rectangle) -> bool:
+        """Return whether ``other`` is inside, apart from rounding."""
+        return (
+            other.left >= self.left - _SLACK
+            and other.bottom >= self.bottom - _SLACK
+            and other.left + other.width <= self.left + self.width + _SLACK
+            and other.bottom + other.height <= self.bottom + self.height + _SLACK
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,16 +6,24 @@ The modules of each kind draw them. Nothing here is random, depends on time, or 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from service.grading.grade import CriterionResult, Grade, Prediction
 from service.language import ENGLISH, Language
 from service.reports.display_text import format_heading, to_one_line
 from service.reports.plots.own_diagrams import OwnDiagram, list_own_diagrams
-from service.reports.plots.plot import Plot, build_hidden_suffix, build_trial_name, format_title, slugify
+from service.reports.plots.plot import (
+    VECTOR_KINDS,
+    Plot,
+    PlotKind,
+    build_hidden_suffix,
+    build_trial_name,
+    format_title,
+    slugify,
+)
 from service.reports.plots.sensor_images import find_misread, is_right, select_predictions
 from service.reports.plots.track_images import find_tracks
 from service.reports.view import (
@@ -32,12 +40,12 @@ from sim.recording_values import is_stationary
 from submissions.diagram_cells import DiagramCell
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from service.reports.plots.drawing import Drawing
 
 _log = logging.getLogger(__name__)
 
+Drawn = TypeVar("Drawn")
+Rendered = TypeVar("Rendered")
 _NO_IMAGES: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -51,17 +59,22 @@ def list_plots(grade: Grade, language: Language = ENGLISH) -> tuple[Plot, ...]:
 
 
 def draw_all_plots(
-    grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES, cells: Sequence[DiagramCell] = ()
+    grade: Grade,
+    images: Mapping[str, Pixels] = _NO_IMAGES,
+    cells: Sequence[DiagramCell] = (),
+    *,
+    omitted_kinds: Collection[PlotKind] = (),
 ) -> dict[str, bytes]:
     """Draw every plot of ``grade`` and of the notebook's ``cells``, for staff and student, as name -> PNG.
 
     ``images`` are floors that are not built in, by background name, (1143, 2362, 3) uint8 with row 0 at y = 1143 mm. A
-    floor that is in neither is drawn white. A plot that cannot be drawn is an image with a sentence that says so.
+    floor that is in neither is drawn white. A plot that cannot be drawn is an image with a sentence that says so. Plots
+    of ``omitted_kinds`` are not drawn.
     """
     png_files: dict[str, bytes] = {}
     for view in (build_staff_view(grade), build_student_view(grade)):
         for plot in list_plots(view.grade):
-            if plot.name not in png_files:
+            if plot.name not in png_files and plot.kind not in omitted_kinds:
                 png_files[plot.name] = _render_plot(view.grade, plot, images)
         for own_diagram in list_own_diagrams(view.grade, cells):
             for plot in own_diagram.plots:
@@ -70,36 +83,53 @@ def draw_all_plots(
     return png_files
 
 
+def draw_vector_plots(grade: Grade, images: Mapping[str, Pixels] = _NO_IMAGES) -> dict[str, str]:
+    """Draw the plots of ``grade`` that reports show as SVG, as name -> document. ``images`` are the floors as above."""
+    return {
+        plot.name: _render_vector_plot(grade, plot, images) for plot in list_plots(grade) if plot.kind in VECTOR_KINDS
+    }
+
+
 def _render_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> bytes:
     # The drawing library is loaded only if there is something to draw.
     from service.reports.plots.figures import draw_plot
+    from service.reports.plots.png import render_png
 
-    return _render_or_explain(plot, partial(draw_plot, grade, plot, images))
+    return _render_or_explain(plot, partial(draw_plot, grade, plot, images), render_png)
 
 
 def _render_own_plot(own_diagram: OwnDiagram, grade: Grade, plot: Plot) -> bytes:
     from service.reports.plots.diagram_drawing import draw_own_diagram
+    from service.reports.plots.png import render_png
 
-    return _render_or_explain(plot, partial(draw_own_diagram, own_diagram, grade, plot))
+    return _render_or_explain(plot, partial(draw_own_diagram, own_diagram, grade, plot), render_png)
 
 
-def _render_or_explain(plot: Plot, draw: Callable[[], Drawing | Figure]) -> bytes:
-    """Return the plot from ``draw`` as a PNG, or an image with one sentence if it fails. The log has the cause.
+def _render_vector_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> str:
+    from service.reports.plots.figures import draw_plot
+    from service.reports.plots.svg import render_svg
+
+    return _render_or_explain(plot, partial(draw_plot, grade, plot, images), partial(render_svg, title=plot.title))
+
+
+def _render_or_explain(
+    plot: Plot, draw: Callable[[], Drawn], render: Callable[[Drawn | Drawing], Rendered]
+) -> Rendered:
+    """Return the rendered plot from ``draw``, or an image with one sentence if it fails. The log has the cause.
 
     Raises:
         MemoryError: If memory is short, so that the plot can be drawn later.
     """
     from service.reports.plots.drawing import create_drawing
-    from service.reports.plots.png import render_png
     from service.reports.plots.style import HEAD
 
     try:
-        return render_png(draw())
+        return render(draw())
     except MemoryError:
         raise
     except Exception:
         _log.exception("the plot %s cannot be drawn", plot.name)
-    return render_png(create_drawing(HEAD, "This plot cannot be drawn because of an error in Robomark."))
+    return render(create_drawing(HEAD, "This plot cannot be drawn because of an error in Robomark."))
 
 
 def group_same_answers(grade: Grade) -> tuple[tuple[int, ...], ...]:

@@ -269,8 +269,13 @@ def _box(fill: str, edge: Stroke | None, *, hatched: bool) -> Callable[[Drawing,
 
 
 def _draw_legend(drawing: Drawing, entries: Sequence[_LegendEntry]) -> None:
-    """Draw the entries in columns at the lower left, filled column by column."""
+    """Draw the entries in columns at the lower left, filled column by column.
+
+    They are on a white card, so that they have the colours of the plot on a dark page too.
+    """
     rows = -(-len(entries) // _LEGEND_COLUMNS)
+    width = _LEGEND_COLUMN_WIDTH * min(_LEGEND_COLUMNS, -(-len(entries) // rows))
+    drawing.add_rectangle(Rectangle(0.04, 0.0, width, _LEGEND_ROW * rows + 0.02), fill="white")
     for number, entry in enumerate(entries):
         column, row = divmod(number, rows)
         x = 0.08 + _SYMBOL_WIDTH / 2 + column * _LEGEND_COLUMN_WIDTH

@@ -26,6 +26,8 @@ PlotKind = Literal[
     "own",
     "happened",
 ]
+#: The kinds that reports show as SVG. The others consist of images, or are drawn by Matplotlib's figures.
+VECTOR_KINDS: frozenset[PlotKind] = frozenset(("path", "sensors", "confusion", "curves", "track"))
 
 
 @dataclass(frozen=True, slots=True)

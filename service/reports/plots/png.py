@@ -29,6 +29,13 @@ def render_png(plot: Drawing | Figure) -> bytes:
     return stream.getvalue()
 
 
+def encode_png(image: Image.Image) -> bytes:
+    """Return an RGB image as a PNG."""
+    stream = io.BytesIO()
+    _reduce_colours(np.asarray(image.convert("RGBA"))).save(stream, "PNG", compress_level=_COMPRESSION_LEVEL)
+    return stream.getvalue()
+
+
 def _rasterise_figure(figure: Figure) -> NDArray[np.uint8]:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]

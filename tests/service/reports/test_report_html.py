@@ -57,7 +57,7 @@ def test_source_with_hostile_lines_is_escaped() -> None:
     program = replace(submission.program, name="</pre><img src=x>", text="a\nb\n" + build.HOSTILE.replace("\u2028", ""))
     reader = Reader(render_report_page(build_student_view(grade), {}, replace(submission, program=program)))
     assert reader.tags <= TAGS
-    assert reader.values("img", "src") == []
+    assert all(source.startswith("data:image/svg+xml,") for source in reader.values("img", "src"))
 
 
 def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
@@ -65,8 +65,9 @@ def test_the_page_is_self_contained_and_its_policy_fits_its_style() -> None:
     reader = Reader(render_report_page(build_student_view(grade), draw_all_plots(grade)))
     sources = reader.values("img", "src")
     assert len(sources) == 3
-    assert all(source.startswith("data:image/png;base64,") for source in sources)
-    assert base64.b64decode(sources[0].split(",")[1]).startswith(b"\x89PNG")
+    kinds = [source.partition(",")[0] for source in sources]
+    assert kinds == ["data:image/svg+xml", "data:image/png;base64", "data:image/png;base64"]
+    assert base64.b64decode(sources[1].split(",")[1]).startswith(b"\x89PNG")
     assert all(len(alt) > 20 for alt in reader.values("img", "alt"))
     digest = base64.b64encode(hashlib.sha256(reader.style.encode()).digest()).decode()
     policy = next(value for value in reader.values("meta", "content") if value.startswith("default-src"))
