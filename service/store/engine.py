@@ -99,6 +99,19 @@ class Store:
         with Session(engine, expire_on_commit=False, info={_ONLY_READS: True}) as session, session.begin():
             yield session
 
+    @contextmanager
+    def short_transactions(self) -> Iterator[Connection]:
+        """Open a connection on which each statement is a transaction, which saves PostgreSQL two messages.
+
+        On SQLite they are one transaction like ``transaction``, because a process then waits only once.
+        """
+        if self.engine.dialect.name == "sqlite":
+            with self.engine.begin() as connection:
+                yield connection
+        else:
+            with self.engine.connect() as connection:
+                yield connection.execution_options(isolation_level="AUTOCOMMIT")
+
     def with_short_wait(self) -> Store:
         """Return the same database for transactions that fail instead of waiting long for SQLite's write lock."""
         return replace(self, engine=self.engine.execution_options(**{_BUSY_SECONDS: IMPATIENT_SECONDS}))

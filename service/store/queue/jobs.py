@@ -45,7 +45,7 @@ from service.store.queue.job_transitions import (
     Transition,
     apply_transition,
 )
-from service.store.queue.scheduling import check_worker, find_next_job
+from service.store.queue.scheduling import find_choices
 from service.store.states import CancelReason, JobState, PlotState
 from service.store.tables.submissions import Job
 from service.version import hash_grader
@@ -137,31 +137,33 @@ def queue_over_limit_job(session: Session, job_id: str, current_time: datetime) 
 @retry_conflicts
 def claim_job(store: Store, worker: str, lease_seconds: float) -> Claim | None:
     """Claim the next job; None if no job is due or the worker may not claim."""
-    with store.transaction() as session:
-        current_time = check_worker(session, worker)
-        job_id = None if current_time is None else find_next_job(session, current_time, worker)
-        if current_time is None or job_id is None:
+    with store.short_transactions() as connection:
+        turn = find_choices(connection, worker)
+        if turn is None:
             return None
+        current_time, choices = turn
         lease = secrets.token_hex(16)
         values = {
-            "job_id": job_id,
             "lease": lease,
             "lease_until": current_time + timedelta(seconds=lease_seconds),
-            "current_time": current_time,
-            "worker": worker,
             "process": os.getpid(),
         }
-        row = session.connection().execute(_build_claim_statement(), values).one_or_none()
-        return None if row is None else Claim(job_id, lease, row.attempt, row.max_attempts, current_time)
+        for choice in choices:
+            statement = _build_claim_statement(choice.query)
+            row = connection.execute(statement, {**choice.parameters, **values}).one_or_none()
+            if row is not None:
+                return Claim(row.id, lease, row.attempt, row.max_attempts, current_time)
+        return None
 
 
 @cache
-def _build_claim_statement() -> ReturningUpdate[Any]:
-    """Return the statement that takes a job whose row is locked. It is built once, because claims are frequent."""
+def _build_claim_statement(choice: Select[Any]) -> ReturningUpdate[Any]:
+    """Return the statement that takes the job of a choice. Each is built once, because claims are frequent."""
     table = cast("Table", Job.__table__)
+    chosen_job = choice.cte("chosen_job")
     return (
         update(table)
-        .where(table.c.id == bindparam("job_id"), table.c.state.in_(CLAIM.before))
+        .where(table.c.id == select(chosen_job.c.id).scalar_subquery(), table.c.state.in_(CLAIM.before))
         .values(
             state=CLAIM.after,
             attempt=table.c.attempt + 1,
@@ -169,11 +171,11 @@ def _build_claim_statement() -> ReturningUpdate[Any]:
             lease_until=bindparam("lease_until"),
             heartbeat_at=bindparam("current_time"),
             started_at=bindparam("current_time"),
-            worker=bindparam("worker"),
+            worker=bindparam("claimant"),
             process=bindparam("process"),
             progress=0.0,
         )
-        .returning(table.c.attempt, table.c.max_attempts)
+        .returning(table.c.id, table.c.attempt, table.c.max_attempts)
     )
 
 

@@ -1,6 +1,6 @@
 """Scheduling: the next job by queue, by fair share of course, batch and student, and by age.
 
-Only reads (and, on PostgreSQL, locks) the row; ``jobs.claim_job`` takes the job. The cost of a claim depends on the
+Only chooses; ``jobs.claim_job`` takes the job, in the statement that chooses it. The cost of a claim depends on the
 number of batches with waiting jobs, not on the number of these jobs: each step reads the start of an index. The
 statements are built once, because building one takes longer than running it.
 """
@@ -8,7 +8,7 @@ statements are built once, because building one takes longer than running it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cache
@@ -16,27 +16,25 @@ from itertools import groupby
 from typing import Any
 
 from sqlalchemy import (
-    BindParameter,
     ColumnElement,
-    CompoundSelect,
+    DateTime,
+    Interval,
     Select,
     and_,
     bindparam,
     case,
     func,
-    literal,
     literal_column,
     not_,
     null,
     or_,
     select,
+    true,
     union_all,
 )
 from sqlalchemy.engine import Connection
-from sqlalchemy.orm import Session
 from sqlalchemy.sql.selectable import CTE
 
-from service.store.engine import now
 from service.store.queue.workers import ALIVE_PERIOD, match_other_live_worker
 from service.store.revision import is_newer_than_code, select_oldest_compatible
 from service.store.states import BatchState, JobQueue, JobState
@@ -56,6 +54,11 @@ RESERVED_PERIOD = timedelta(seconds=20)
 _JOB, _BATCH, _ENROLMENT, _WORKER = (table.__table__ for table in (Job, Batch, Enrolment, Worker))
 # Written into the statement: with a parameter instead, no database would use an index of queued jobs only.
 _IS_QUEUED: ColumnElement[bool] = literal_column(f"job.state = '{JobState.QUEUED.value}'")
+# Other constants, too: PostgreSQL plans a statement again each time if its parameters could change the plan.
+_QUEUES: tuple[ColumnElement[Any], ...] = tuple(
+    literal_column(f"'{lane.value}'", _JOB.c.lane.type) for lane in JobQueue
+)
+_IS_OPEN: ColumnElement[bool] = _BATCH.c.state == literal_column(f"'{BatchState.OPEN.value}'")
 _ZERO: ColumnElement[int] = literal_column("0")
 _ONE: ColumnElement[int] = literal_column("1")
 
@@ -80,7 +83,7 @@ def match_claimable_jobs(current_time: datetime) -> tuple[ColumnElement[bool], .
 
 
 def select_recent_jobs(
-    since: datetime | BindParameter[datetime], until: datetime | BindParameter[datetime]
+    since: datetime | ColumnElement[datetime], until: datetime | ColumnElement[datetime]
 ) -> Select[JobQueue, str | None, int]:
     """Return a query for the queue, batch and student of every job that counts towards a share.
 
@@ -94,42 +97,61 @@ def select_recent_jobs(
     )
 
 
-def check_worker(session: Session, worker: str) -> datetime | None:
-    """Return the database's clock; None if the worker is in quarantine or its code is too old for the tables."""
-    query = _build_worker_query(session.get_bind().dialect.name)
-    clock, oldest_compatible, quarantined_at = session.connection().execute(query, {"worker": worker}).one()
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A query whose row ends with the id of a job to claim, with its parameters. Without a row, the next one counts.
+
+    On PostgreSQL, the query locks the row of the job. ``query`` is always one of a few objects.
+    """
+
+    query: Select[Any]
+    parameters: Mapping[str, object]
+
+
+def find_choices(connection: Connection, worker: str) -> tuple[datetime, Iterator[Choice]] | None:
+    """Return the database's clock and the choices of ``worker``'s next job, in order.
+
+    None if the worker is in quarantine or its code is too old for the tables. Interactive jobs come first, except for
+    one job in five, and completions of pools last. Within a queue, the course with the fewest recently started jobs
+    comes first, then the batch, then the student, then the oldest job.
+    """
+    clock = datetime.now(UTC)  # SQLite has none
+    rows = connection.execute(
+        _build_turn_query(connection.dialect.name), {"claimant": worker, **_compute_share_limits(clock)}
+    ).all()
+    database_clock, oldest_compatible, quarantined_at, *_ = rows[0]
     if is_newer_than_code(oldest_compatible) or quarantined_at is not None:
         return None
-    return now(session) if clock is None else clock.astimezone(UTC)
-
-
-def find_next_job(session: Session, current_time: datetime, worker: str) -> str | None:
-    """Return the id of the job that ``worker`` should claim next; None if no job is due.
-
-    Interactive jobs come first, except for one job in five, and completions of pools last. Within a queue, the course
-    with the fewest recently started jobs comes first, then the batch, then the student, then the oldest job.
-    """
-    connection = session.connection()
-    parameters = {
-        "share_since": current_time - SHARE_WINDOW,
-        "share_until": current_time + SHARE_WINDOW,
-        "current_time": current_time,
-        "worker": worker,
-        "reserved_since": current_time - RESERVED_PERIOD,
-        "alive_since": current_time - ALIVE_PERIOD,
-    }
+    current_time = clock if database_clock is None else database_clock.astimezone(UTC)
     groups, job_counts = list[_Group](), Counter[_Group]()
-    for lane, course_id, batch_id, count in connection.execute(_build_group_query(), parameters):
+    for _, _, _, lane, course_id, batch_id, count in rows:
         group = _Group(lane, course_id, batch_id)
         if count:
             job_counts[group] += count
-        else:
+        elif lane is not None:
             groups.append(group)
-    for tied_groups in _rank_groups(groups, job_counts):
-        job_id = _find_first_job(connection, tied_groups, parameters)
-        if job_id is not None:
-            return job_id
-    return None
+    parameters = {
+        **_compute_share_limits(current_time),
+        "current_time": current_time,
+        "claimant": worker,
+        "reserved_since": current_time - RESERVED_PERIOD,
+        "alive_since": current_time - ALIVE_PERIOD,
+    }
+    return current_time, _iterate_choices(_rank_groups(groups, job_counts), parameters)
+
+
+def _compute_share_limits(current_time: datetime) -> dict[str, datetime]:
+    return {"share_since": current_time - SHARE_WINDOW, "share_until": current_time + SHARE_WINDOW}
+
+
+def _iterate_choices(ranked_groups: Iterable[Sequence[_Group]], parameters: Mapping[str, object]) -> Iterator[Choice]:
+    """Yield, for groups with equal shares, the students without recently started jobs, then those with the fewest."""
+    for tied_groups in ranked_groups:
+        batch_ids = [group.batch_id for group in tied_groups if group.batch_id is not None]
+        course_ids = [group.course_id for group in tied_groups if group.batch_id is None]
+        places = {"queue": tied_groups[0].lane, "batch_ids": batch_ids, "course_ids": course_ids}
+        for is_served in (False, True):
+            yield Choice(_build_choice_query(bool(batch_ids), bool(course_ids), is_served), {**parameters, **places})
 
 
 def _rank_groups(groups: Sequence[_Group], job_counts: Mapping[_Group, int]) -> Iterator[list[_Group]]:
@@ -152,41 +174,48 @@ def _rank_groups(groups: Sequence[_Group], job_counts: Mapping[_Group, int]) -> 
         yield list(tied_groups)
 
 
-def _find_first_job(
-    connection: Connection, tied_groups: Sequence[_Group], parameters: Mapping[str, object]
-) -> str | None:
-    """Return the job of the student with the fewest recently started jobs, or else the oldest, and lock its row."""
-    batch_ids = [group.batch_id for group in tied_groups if group.batch_id is not None]
-    course_ids = [group.course_id for group in tied_groups if group.batch_id is None]
-    parameters = {**parameters, "lane": tied_groups[0].lane, "batch_ids": batch_ids, "course_ids": course_ids}
-    for in_batches, without_batch in (
-        (_build_batch_query(), _build_single_query()),
-        (_build_served_batch_query(), _build_served_single_query()),
-    ):
-        queries = [query for query, values in ((in_batches, batch_ids), (without_batch, course_ids)) if values]
-        rows = [tuple(row) for query in queries for row in connection.execute(query, parameters)]
-        if rows:
-            *_, job_id = min(rows)
-            return str(job_id)
-    return None
+@cache
+def _build_choice_query(has_batches: bool, has_courses: bool, is_served: bool) -> Select[Any]:
+    """Return the query for the first job in batches, of courses without a batch, or of both."""
+    in_batches, without_batch = (
+        (_build_served_batch_query, _build_served_single_query)
+        if is_served
+        else (_build_batch_query, _build_single_query)
+    )
+    if not has_courses:
+        return in_batches()
+    if not has_batches:
+        return without_batch()
+    first_jobs = (in_batches().cte("first_in_batches"), without_batch().cte("first_without_batch"))
+    jobs = union_all(*(select(first_job) for first_job in first_jobs)).subquery("jobs")
+    return select(jobs).order_by(*jobs.c).limit(_ONE)
 
 
 @cache
-def _build_worker_query(dialect: str) -> Select[Any]:
-    """Return the query for the database's clock if it has one, the oldest compatible revision, and a quarantine."""
-    clock = null() if dialect == "sqlite" else func.clock_timestamp()
-    quarantine = select(_WORKER.c.quarantined_at).where(_WORKER.c.name == bindparam("worker"))
-    return select(clock, select_oldest_compatible().scalar_subquery(), quarantine.scalar_subquery())
+def _build_turn_query(dialect: str) -> Select[Any]:
+    """Return the query for everything that a claim needs to know before it chooses.
+
+    Each row has the database's clock (if it has one), the oldest compatible revision, and a quarantine. Then follows a
+    group with waiting jobs, or one with recently started ones and their number; empty if there is no group.
+    """
+    limits: tuple[ColumnElement[datetime], ColumnElement[datetime]]
+    if dialect == "sqlite":
+        clock: ColumnElement[Any] = null()
+        limits = bindparam("share_since"), bindparam("share_until")
+    else:
+        clock = func.statement_timestamp(type_=DateTime(timezone=True))
+        window = literal_column(f"interval '{SHARE_WINDOW.total_seconds()} seconds'", Interval())
+        limits = clock - window, clock + window
+    quarantine = select(_WORKER.c.quarantined_at).where(_WORKER.c.name == bindparam("claimant"))
+    groups = union_all(_select_shares(*limits), _select_waiting_batches(), _select_waiting_courses()).subquery("groups")
+    checks = select(
+        clock.label("clock"), select_oldest_compatible().scalar_subquery(), quarantine.scalar_subquery()
+    ).subquery("checks")
+    return select(checks, groups).select_from(checks.outerjoin(groups, true()))
 
 
-@cache
-def _build_group_query() -> CompoundSelect[Any]:
-    """Return the query for the groups with waiting jobs, and for those with recently started ones and their number."""
-    return union_all(_select_shares(), _select_waiting_batches(), _select_waiting_courses())
-
-
-def _select_shares() -> Select[Any]:
-    recent_jobs = _build_recent_jobs()
+def _select_shares(since: ColumnElement[datetime], until: ColumnElement[datetime]) -> Select[Any]:
+    recent_jobs = select_recent_jobs(since, until).cte("recent")
     single_student = case((recent_jobs.c.batch_id.is_(None), recent_jobs.c.enrolment_id))
     columns = (recent_jobs.c.lane, recent_jobs.c.batch_id, single_student.label("enrolment_id"))
     counts = select(*columns, func.count().label("begun")).group_by(*columns).subquery("counts")
@@ -202,7 +231,7 @@ def _select_waiting_batches() -> Select[Any]:
 
     It jumps through the index from one batch to the next, without reading the jobs between.
     """
-    lanes = union_all(*(select(literal(lane, _JOB.c.lane.type).label("lane")) for lane in JobQueue)).subquery("lanes")
+    lanes = union_all(*(select(queue.label("lane")) for queue in _QUEUES)).subquery("lanes")
     first_batch = select(func.min(_JOB.c.batch_id)).where(_IS_QUEUED, _JOB.c.lane == lanes.c.lane)
     waiting = select(lanes.c.lane, first_batch.scalar_subquery().label("batch_id")).cte("waiting", recursive=True)
     next_batch = select(func.min(_JOB.c.batch_id)).where(
@@ -214,7 +243,7 @@ def _select_waiting_batches() -> Select[Any]:
     return (
         select(waiting.c.lane, _BATCH.c.course_id, _BATCH.c.id, _ZERO)
         .join(_BATCH, _BATCH.c.id == waiting.c.batch_id)
-        .where(_BATCH.c.state == BatchState.OPEN)
+        .where(_IS_OPEN)
     )
 
 
@@ -223,12 +252,11 @@ def _select_waiting_courses() -> Select[Any]:
     return (
         select(_JOB.c.lane, _ENROLMENT.c.course_id, null(), _ZERO)
         .join(_ENROLMENT, _ENROLMENT.c.id == _JOB.c.enrolment_id)
-        .where(_IS_QUEUED, _JOB.c.lane.in_(JobQueue), _JOB.c.batch_id.is_(None))
+        .where(_IS_QUEUED, _JOB.c.lane.in_(_QUEUES), _JOB.c.batch_id.is_(None))
         .distinct()
     )
 
 
-@cache
 def _build_batch_query() -> Select[Any]:
     """Return the query for the oldest job, in these batches, of a student without recently started jobs."""
     first_job = (
@@ -251,7 +279,6 @@ def _build_batch_query() -> Select[Any]:
     )
 
 
-@cache
 def _build_single_query() -> Select[Any]:
     """Return the same query for the jobs without a batch in these courses."""
     query = select(_JOB.c.queued_at, _JOB.c.id).where(
@@ -260,13 +287,11 @@ def _build_single_query() -> Select[Any]:
     return _choose_first(query)
 
 
-@cache
 def _build_served_batch_query() -> Select[Any]:
     """Return the query for the job, in these batches, of the student with the fewest recently started jobs, if any."""
     return _build_served_query(_JOB.c.batch_id.in_(bindparam("batch_ids", expanding=True)))
 
 
-@cache
 def _build_served_single_query() -> Select[Any]:
     """Return the same query for the jobs without a batch in these courses."""
     return _build_served_query(*_match_single_jobs())
@@ -299,15 +324,15 @@ def _build_recent_jobs() -> CTE:
 def _match_due_jobs() -> tuple[ColumnElement[bool], ...]:
     """Return the conditions for a job of one queue that the worker may claim, if its batch is open."""
     # A stopped worker returns its jobs without a fault, and then no error is stored.
-    has_failed_here = and_(_JOB.c.attempt > 0, _JOB.c.worker == bindparam("worker"), _JOB.c.error.is_not(None))
+    has_failed_here = and_(_JOB.c.attempt > 0, _JOB.c.worker == bindparam("claimant"), _JOB.c.error.is_not(None))
     is_reserved = and_(
         has_failed_here,
         _JOB.c.due_at > bindparam("reserved_since"),
-        match_other_live_worker(bindparam("worker"), bindparam("alive_since")),
+        match_other_live_worker(bindparam("claimant"), bindparam("alive_since")),
     )
     return (
         _IS_QUEUED,
-        _JOB.c.lane == bindparam("lane"),
+        _JOB.c.lane == bindparam("queue"),
         # An expression, because an index of this column is no use here, and SQLite has no statistics to see that.
         func.coalesce(_JOB.c.due_at, null()) <= bindparam("current_time"),
         not_(is_reserved),

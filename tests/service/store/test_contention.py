@@ -20,6 +20,7 @@ import acting
 import report_builders
 import service
 from builders import accept_one, grading_request, prepared
+from job_choice import choose_job
 from paths import ROOT
 from processes import until
 from service.lti.keys import ensure_signing_key
@@ -27,13 +28,12 @@ from service.store.batches import intake
 from service.store.batches.intake import accept_batch
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
-from service.store.engine import Store, is_conflict, now, retry_conflicts
+from service.store.engine import Store, is_conflict, retry_conflicts
 from service.store.grades import appeals, overrides
 from service.store.people import lti
 from service.store.people.lti import Registration
 from service.store.queue import jobs, lease_reaper, self_tests, test_runs
 from service.store.queue.jobs import RetryPolicy
-from service.store.queue.scheduling import find_next_job
 from service.store.states import JobQueue, JobState, Standing
 from service.store.tables.base import Base
 from service.store.tables.courses import Extension, Policy
@@ -287,7 +287,7 @@ def _one_submission(store: Store) -> tuple[int, int]:
 def test_two_workers_at_once_claim_the_two_oldest_jobs_of_a_batch(server: Store) -> None:
     batch = accept_batch(server, "class", [grading_request(name) for name in STUDENTS], [], max_attempts=3)
     with server.transaction() as session:
-        first = find_next_job(session, now(session), "first")
+        first = choose_job(session, "first")
         # The second worker does not wait for the first one's transaction.
         second = jobs.claim_job(server, "second", 60)
     assert second is not None

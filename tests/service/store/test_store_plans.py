@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from sqlalchemy import event, insert, select
+from sqlalchemy import event, insert, select, text
 from sqlalchemy.orm import Session
 
 from builders import accept_one, grading_request, opened, settings_in
+from job_choice import choose_job
 from service.store.batches import batches, job_lines
 from service.store.batches.intake import accept_batch
-from service.store.engine import Store, now
+from service.store.engine import Store
 from service.store.queue import jobs
-from service.store.queue.scheduling import find_next_job
 from service.store.states import Standing
 from service.store.tables.submissions import Job
 
@@ -28,7 +28,7 @@ def sqlite(tmp_path: Path) -> Iterator[Store]:
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda session: find_next_job(session, now(session), "worker"),
+        choose_job,
         batches.list_batches,
         lambda session: batches.load_progress(session, "none"),
         lambda session: job_lines.load_job_lines(session, "none"),
@@ -60,9 +60,7 @@ def test_a_claim_does_the_same_work_for_few_and_for_many_waiting_jobs(sqlite: St
 
 def test_a_claim_reads_waiting_and_started_jobs_from_indexes(sqlite: Store) -> None:
     accept_batch(sqlite, "batch", [grading_request("ada")], [], max_attempts=3)
-    read = [
-        line for line in _plans(sqlite, lambda session: find_next_job(session, now(session), "worker")) if "job" in line
-    ]
+    read = [line for line in _plans(sqlite, choose_job) if "job" in line]
     indexes = ("ix_job_waiting", "ix_job_started_at_lane_batch_id_enrolment_id", "sqlite_autoindex_job_1")
     assert [line for line in read if not any(index in line for index in indexes)] == []
 
@@ -73,7 +71,7 @@ def _count_steps(store: Store) -> int:
     with store.reading() as session:
         connection = session.connection().connection.driver_connection
         connection.set_progress_handler(lambda: steps.append(10), 10)  # type: ignore[union-attr]
-        assert find_next_job(session, now(session), "worker") is not None
+        assert choose_job(session) is not None
     return len(steps)
 
 
@@ -106,3 +104,25 @@ def _plans(store: Store, ask: Callable[[Session], object]) -> list[str]:
             for statement, parameters in statements
             for row in connection.exec_driver_sql("EXPLAIN QUERY PLAN " + statement, parameters)
         ]
+
+
+def test_a_claim_is_two_statements(store: Store) -> None:
+    accept_batch(store, "batch", [grading_request(name) for name in ("ada", "bob")], [], max_attempts=3)
+    statements: list[str] = []
+    event.listen(store.engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
+    assert jobs.claim_job(store, "worker", 60) is not None
+    assert len([each for each in statements if not each.startswith(("BEGIN", "PRAGMA"))]) == 2
+
+
+@pytest.mark.long
+def test_postgresql_plans_the_first_statement_of_a_claim_only_at_the_start(store: Store) -> None:
+    if store.engine.dialect.name == "sqlite":
+        pytest.skip("SQLite keeps no plans")
+    accept_batch(store, "batch", [grading_request(f"student-{number}") for number in range(20)], [], max_attempts=3)
+    for _ in range(20):
+        assert jobs.claim_job(store, "worker", 60) is not None
+    with store.reading() as session:
+        query = text("SELECT custom_plans, generic_plans FROM pg_prepared_statements WHERE statement LIKE 'WITH REC%'")
+        ((custom_plans, generic_plans),) = session.execute(query)
+    assert custom_plans <= 5
+    assert generic_plans >= 5
