@@ -23,6 +23,7 @@ class Unit:
 
 
 RATIO = Unit(" times", 2)
+EXPONENT = Unit("", 2)
 GAIN = Unit(" times", 2, more_is_better=True)
 SECONDS = Unit(" s", 3, slowness=1)
 MILLISECONDS = Unit(" ms", 2, slowness=1)
@@ -56,7 +57,7 @@ class Measurement:
     @property
     def gates(self) -> bool:
         """Whether a ratio misses its budget, which a slow machine does not explain."""
-        return self.misses and self.unit in (RATIO, GAIN)
+        return self.misses and self.unit in (RATIO, GAIN, EXPONENT)
 
 
 def median(values: Sequence[float]) -> float:
