@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
 
 import pytest
 
 from responders.source_file import SourceFile
-from service.commands import verification
-from service.commands.verification import _compare_marks, _compare_trials, _find_cause
+from service.commands.verification import _compare_marks, _compare_trials, _find_cause, _grade_again
 from service.grading.grade import Grade, TrialResult
 from service.grading.grader import grade
+from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from sim.recording import TimedText, Verdict
 from submissions.assignment.reader import find_assignment
@@ -25,6 +26,10 @@ def _stored_otherwise(graded: Grade) -> list[tuple[TrialResult, TrialResult]]:
     return [(replace(each, recording=replace(each.recording, sha256="0" * 64)), each) for each in graded.trials]
 
 
+def _repeating(request: GradingRequest) -> Callable[[int], Grade]:
+    return lambda earlier: _grade_again(request, PUBLIC_SECRET, PoolExtent.WHOLE, earlier)
+
+
 @pytest.mark.parametrize(
     ("program", "cause"),
     [
@@ -36,8 +41,8 @@ def _stored_otherwise(graded: Grade) -> list[tuple[TrialResult, TrialResult]]:
 def test_a_trial_that_differs_is_repeated_in_fresh_processes(program: str, cause: str, runner: TrialRunner) -> None:
     request = GradingRequest(Submission("ada", SourceFile("robot.py", program)), find_assignment("say-tm129"), "ada")
     again = grade(request.submission, request.assignment, runner=runner)
-    assert _find_cause(_stored_otherwise(again), [], again, request, PUBLIC_SECRET) == cause
-    assert _find_cause(list(zip(again.trials, again.trials, strict=True)), [], again, request, PUBLIC_SECRET) is None
+    assert _find_cause(_stored_otherwise(again), [], again, _repeating(request)) == cause
+    assert _find_cause(list(zip(again.trials, again.trials, strict=True)), [], again, _repeating(request)) is None
 
 
 def _graded(runner: TrialRunner) -> tuple[GradingRequest, Grade]:
@@ -80,9 +85,7 @@ def test_only_criteria_that_look_at_a_cut_trial_may_differ(runner: TrialRunner) 
 
 
 @pytest.mark.parametrize(("others", "cause"), [((5, 2), "program"), ((2, 5), "program"), ((5, 5), None)])
-def test_a_limit_hides_no_chance_of_a_program(
-    others: tuple[int, int], cause: str | None, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_limit_hides_no_chance_of_a_program(others: tuple[int, int], cause: str | None, runner: TrialRunner) -> None:
     """A program can run into a limit by chance. Marks that differ there are repeated as well."""
     request, again = _graded(runner)
 
@@ -90,13 +93,12 @@ def test_a_limit_hides_no_chance_of_a_program(
         return replace(again, criteria=tuple(replace(each, marks=Decimal(marks)) for each in again.criteria))
 
     grades = iter(map(with_marks, others))
-    monkeypatch.setattr(verification, "_grade_again", lambda *args, **named: next(grades))
     rows = [(_cut(each), each) for each in again.trials]
     marks = ["cut by a limit"] * len(again.criteria)
-    assert _find_cause(rows, marks, with_marks(5), request, PUBLIC_SECRET) == cause
+    assert _find_cause(rows, marks, with_marks(5), lambda _: next(grades)) == cause
 
 
 def test_marks_that_differ_have_a_cause_without_trials(runner: TrialRunner) -> None:
     request, again = _graded(runner)
-    assert _find_cause([], ["differs"], again, request, PUBLIC_SECRET) == "grader"
-    assert _find_cause([], ["same"], again, request, PUBLIC_SECRET) is None
+    assert _find_cause([], ["differs"], again, _repeating(request)) == "grader"
+    assert _find_cause([], ["same"], again, _repeating(request)) is None

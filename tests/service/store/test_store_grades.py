@@ -88,10 +88,15 @@ def test_sentences_of_a_stored_grade_can_be_translated(store: Store, sentence: s
     with store.reading() as session:
         back = results.load_grade(session, job_id)
         in_list = results.load_marks(session, [job_id])[job_id]
-    texts: list[str] = []
-    convert_texts(back, lambda text: texts.append(text) or text)
-    stored_sentences = [each for each in texts if isinstance(each, Sentence)]
+    stored_sentences: list[Sentence] = []
+
+    def collect(text: str) -> str:
+        stored_sentences.extend([text] if isinstance(text, Sentence) else [])
+        return text
+
+    convert_texts(back, collect)
     assert len(stored_sentences) == len(evidence) + 6
+    assert isinstance(sentence, Sentence)
     assert {each.template for each in stored_sentences} == {sentence.template}
     assert {str(each) for each in stored_sentences} == {make_storable(str(sentence))}
     assert isinstance(in_list.criteria[0].message, Sentence)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,12 +15,12 @@ from service.grading.pools.mean_bounds import bound_mean, find_plausible_means
 
 ERROR = 0.05
 SIZE = 200
-Scores = np.ndarray[tuple[int], np.dtype[np.float64]]
+Scores = npt.NDArray[np.float64]
 POOLS: dict[str, Callable[[np.random.Generator], Scores]] = {
     "uniform": lambda chance: chance.random(SIZE),
     "around a quarter": lambda chance: chance.beta(10, 30, SIZE),
-    "few passes": lambda chance: (chance.random(SIZE) < 0.1) * 1.0,
-    "half passes": lambda chance: (chance.random(SIZE) < 0.5) * 1.0,
+    "few passes": lambda chance: np.where(chance.random(SIZE) < 0.1, 1.0, 0.0),
+    "half passes": lambda chance: np.where(chance.random(SIZE) < 0.5, 1.0, 0.0),
     "extremes": lambda chance: chance.beta(0.5, 0.5, SIZE),
     "constant": lambda chance: np.full(SIZE, 0.7),
     "nearly full": lambda chance: np.where(chance.random(SIZE) < 0.03, chance.random(SIZE), 1.0),
