@@ -87,7 +87,7 @@ def test_only_criteria_that_look_at_a_cut_trial_may_differ(runner: TrialRunner) 
 @pytest.mark.parametrize(("others", "cause"), [((5, 2), "program"), ((2, 5), "program"), ((5, 5), None)])
 def test_a_limit_hides_no_chance_of_a_program(others: tuple[int, int], cause: str | None, runner: TrialRunner) -> None:
     """A program can run into a limit by chance. Marks that differ there are repeated as well."""
-    request, again = _graded(runner)
+    _, again = _graded(runner)
 
     def with_marks(marks: int) -> Grade:
         return replace(again, criteria=tuple(replace(each, marks=Decimal(marks)) for each in again.criteria))
