@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import io
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
 from service.reports.plots.drawing import Drawing
 from service.reports.plots.palette import PLOT_PALETTE
 from service.reports.plots.plot import DPI
-from service.reports.plots.raster import rasterise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MAX_DIFFERENCE = 0.5  # of 255, the mean over channels and pixels
 _VISIBLE_DIFFERENCE, _MAX_VISIBLE_SHARE = 40, 0.0002  # of 255 in one channel, and the share of channels
@@ -23,6 +24,9 @@ _COMPRESSION_LEVEL = 3  # costs half of level 6, for a fifth more bytes
 
 def render_png(plot: Drawing | Figure) -> bytes:
     """Return the plot as a PNG."""
+    # SVG documents need neither the renderer nor figures.
+    from service.reports.plots.raster import rasterise
+
     stream = io.BytesIO()
     pixels = rasterise(plot) if isinstance(plot, Drawing) else _rasterise_figure(plot)
     _reduce_colours(pixels).save(stream, "PNG", compress_level=_COMPRESSION_LEVEL, dpi=(DPI, DPI))
@@ -37,6 +41,8 @@ def encode_png(image: Image.Image) -> bytes:
 
 
 def _rasterise_figure(figure: Figure) -> NDArray[np.uint8]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     return np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
