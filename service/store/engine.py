@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import wraps
 from pathlib import Path
-from typing import ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar
 
 from sqlalchemy import ColumnElement, Engine, create_engine, event, func, literal, make_url, select
 from sqlalchemy.engine import Connection
@@ -94,8 +94,15 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """Open a read-only transaction; on SQLite it does not block writers. Its clock stands still."""
-        engine = self.engine.execution_options(**{_ONLY_READS: True})
+        """Open a read-only transaction whose statements all see the same rows, and whose clock stands still.
+
+        On SQLite it does not block writers.
+        """
+        options: dict[str, Any] = {_ONLY_READS: True}
+        if self.engine.dialect.name == "postgresql":
+            # Otherwise, a row that another transaction deletes could be missing in the second statement of a page.
+            options["isolation_level"] = "REPEATABLE READ"
+        engine = self.engine.execution_options(**options)
         with Session(engine, expire_on_commit=False, info={_ONLY_READS: True}) as session, session.begin():
             yield session
 

@@ -47,6 +47,18 @@ STUDENTS = [f"student-{number}" for number in range(6)]
 ROUNDS = 25
 
 
+def test_all_statements_of_a_reading_transaction_see_the_same_rows(store: Store) -> None:
+    accepted = accept_one(store)
+    is_accepted = Job.id == accepted.job_id
+    with store.reading() as session:
+        assert session.scalar(select(func.count()).select_from(Job)) == 1
+        with store.transaction() as other:
+            other.execute(delete(Job).where(is_accepted))
+        assert session.scalar(select(Job.id).where(is_accepted)) == accepted.job_id
+    with store.reading() as session:
+        assert session.scalar(select(Job.id).where(is_accepted)) is None
+
+
 def _finish_next(store: Store, worker: str) -> None:
     claim = jobs.claim_job(store, worker, 60)
     if claim is not None:
