@@ -142,7 +142,12 @@ def preview_publication(batch: BatchId) -> None:
     with open_installation() as (service, actor):
         stored_batch = batches.find(service, actor, batch)
         preview = operations.preview_publication(service, actor, stored_batch.course_id, stored_batch.id)
-    print_json(batch=stored_batch.id, publication=preview.counts, students=preview.students)
+    print_json(
+        batch=stored_batch.id,
+        publication=preview.counts,
+        students=preview.students,
+        completion_seconds=preview.completion_seconds,
+    )
     print_line(
         f"batch {stored_batch.id}, {preview.students} students: {_describe_published(preview.counts, 'to publish')}"
     )
@@ -171,6 +176,7 @@ def _describe_published(publication: PublicationCounts, verb: str) -> str:
             (publication.dead, "could not be graded"),
             (publication.staff_only, "over a limit and for staff only"),
             (publication.unjudged, "with criteria that could not be judged (--anyway publishes them)"),
+            (publication.provisional, "provisional until all trials are run (--anyway publishes them)"),
         )
         if count
     ]

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from service.store.engine import now
 from service.store.grades import current_grades, overrides
 from service.store.locks import lock_jobs, lock_submissions
+from service.store.queue.pool_progress import estimate_completion_seconds
 from service.store.states import UNFINISHED, JobState, Standing
 from service.store.tables.grades import CriterionResultRow
 from service.store.tables.submissions import Job, SubmissionRow
@@ -35,10 +36,14 @@ class PublicationCounts:
 
 @dataclass(frozen=True, slots=True)
 class PublicationPreview:
-    """Preview of a publication, with the number of students affected."""
+    """Preview of a publication, with the number of students affected.
+
+    ``completion_seconds`` is the estimated CPU time after which the provisional grades are exact.
+    """
 
     counts: PublicationCounts
     students: int
+    completion_seconds: float
 
 
 def publish_batch(
@@ -64,10 +69,10 @@ def publish_grade(session: Session, job_id: str, *, actor: str, includes_held_ba
 def preview_publication(session: Session, batch_id: str) -> PublicationPreview:
     """Return the effect of ``publish_batch`` without grades that are held back. Read-only."""
     submission_ids = _select_batch_submissions(batch_id)
-    plan = _build_plan(
-        session, session.scalars(_select_gradings(submission_ids)).all(), submission_ids, includes_held_back=False
-    )
-    return PublicationPreview(plan.counts, len({job.enrolment_id for job in plan.released}))
+    gradings = session.scalars(_select_gradings(submission_ids)).all()
+    plan = _build_plan(session, gradings, submission_ids, includes_held_back=False)
+    completion_seconds = estimate_completion_seconds(session, [job for job in gradings if job.provisional])
+    return PublicationPreview(plan.counts, len({job.enrolment_id for job in plan.released}), completion_seconds)
 
 
 def count_unpublished_regrades(session: Session, batch_id: str) -> int:

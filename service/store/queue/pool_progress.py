@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -45,9 +47,26 @@ def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
     if not job.provisional:
         return PoolProgress(True)
     completion = _find_completion(session, job.id)
-    spent_seconds = ((job.cost or {}).get("spent") or {}).get("cpu_seconds", 0.0)
-    seconds = spent_seconds * max(pool["size"] / max(1, pool["drawn"]) for pool in pools)
-    return PoolProgress(False, completion is not None and completion.lane is JobQueue.INTERACTIVE, seconds)
+    is_expedited = completion is not None and completion.lane is JobQueue.INTERACTIVE
+    return PoolProgress(False, is_expedited, _estimate_seconds(job, pools))
+
+
+def estimate_completion_seconds(session: Session, provisional_jobs: Sequence[Job]) -> float:
+    """Return the estimated CPU time of all trials of these provisional grades."""
+    jobs_by_id = {job.id: job for job in provisional_jobs}
+    query = select(CriterionResultRow.job_id, CriterionResultRow.pool)
+    pools_by_job: dict[str, list[Any]] = {}
+    for job_id, pool in session.execute(query.where(CriterionResultRow.job_id.in_(jobs_by_id))):
+        if pool is not None:
+            pools_by_job.setdefault(job_id, []).append(pool)
+    return sum(_estimate_seconds(jobs_by_id[job_id], pools) for job_id, pools in pools_by_job.items())
+
+
+def _estimate_seconds(job: Job, pools: Sequence[Any]) -> float:
+    """Return the CPU time of all trials, if the others take as long as those that were run."""
+    spent_seconds: float = ((job.cost or {}).get("spent") or {}).get("cpu_seconds", 0.0)
+    shares = [float(pool["drawn"]) / float(pool["size"]) for pool in pools if pool["drawn"]]
+    return spent_seconds / min(shares, default=1.0)
 
 
 def expedite(

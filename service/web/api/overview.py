@@ -109,8 +109,9 @@ class PublicationShape(Shape):
 
     counts: PublishedShape
     students: int
+    completion_seconds: float = Field(description="Estimated CPU time after which provisional grades are exact.")
 
-    model_config = build_example_config(counts=find_example(PublishedShape), students=19)
+    model_config = build_example_config(counts=find_example(PublishedShape), students=19, completion_seconds=0.0)
 
 
 @router.post("/courses/{course_id}/batches/preflight", openapi_extra=ZIP_BODY | dict(NO_KEY))

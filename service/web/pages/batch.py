@@ -6,6 +6,7 @@ Each action has a command that uses the same operation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import timedelta
 from decimal import Decimal
 from typing import Annotated, Any
 
@@ -198,7 +199,14 @@ def preview_publication(request: Request, access: CourseInstructor, context: Con
     """Show how many grades publishing would release and hold back."""
     _, page_context = _load_batch(access, context, batch_id)
     publication = regrade_operations.preview_publication(context.service, access.actor, access.course_id, batch_id)
-    return render_page(request, access.reader, "batch_publish.html", **page_context, publication=publication)
+    return render_page(
+        request,
+        access.reader,
+        "batch_publish.html",
+        **page_context,
+        publication=publication,
+        completion_time=timedelta(seconds=publication.completion_seconds),
+    )
 
 
 @router.post("/publish")

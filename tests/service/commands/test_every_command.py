@@ -62,7 +62,7 @@ SHOWING = {
     "batch regrade BATCH": "batch regraded",
     "batch publish BATCH": "batch published",
     "batch publish-one GRADE": "grade published",
-    "batch publish-preview BATCH": "batch publication students",
+    "batch publish-preview BATCH": "batch publication students completion_seconds",
     "batch regrade-one GRADE": "grade job",
     "batch grade-over-limit OVER": "grade",
     "batch overview BATCH": "batch classes missing refusals",
