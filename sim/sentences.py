@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Self
+from typing import Literal, Self
 
 
 class Sentence(str):
@@ -53,7 +53,7 @@ def join_sentences(*sentences: str) -> str:
     return Sentence(_PAIR, first=first, second=join_sentences(*others)) if others else first
 
 
-_FIRST_PART, _LAST_PART = re.compile(r"%\((\w+)\)s"), re.compile(r".*%\((\w+)\)s\Z", re.DOTALL)
+_PART = re.compile(r"%\((\w+)\)s")
 
 
 def make_clause(sentence: str) -> str:
@@ -61,22 +61,31 @@ def make_clause(sentence: str) -> str:
 
     Where the catalogue has only the whole sentence, ``service.language`` translates that, without its full stop.
     """
-    return drop_full_stop(_change_edge(sentence, _FIRST_PART, lambda text: text[:1].lower() + text[1:]))
+    return drop_full_stop(_change_edge(sentence, 0, lambda text: text[:1].lower() + text[1:]))
 
 
 def drop_full_stop(sentence: str) -> str:
     """Return a sentence without its final full stop."""
-    return _change_edge(sentence, _LAST_PART, lambda text: text.rstrip("."))
+    return _change_edge(sentence, -1, lambda text: text.rstrip("."))
 
 
-def _change_edge(sentence: str, edge: re.Pattern[str], change: Callable[[str], str]) -> str:
-    """Return the sentence with the change made to its template, or to the value at this edge of it."""
+def _change_edge(sentence: str, edge: Literal[0, -1], change: Callable[[str], str]) -> str:
+    """Return the sentence with the change made to its template, or to the value that begins (0) or ends (-1) it."""
     if not isinstance(sentence, Sentence):
         return change(sentence)
-    match = edge.match(sentence.template) if sentence.values else None
-    value = sentence.values[match[1]] if match is not None else None
-    if match is None:
+    name = _find_edge_part(sentence.template, edge) if sentence.values else ""
+    if not name:
         return Sentence(change(sentence.template), **sentence.values)
+    value = sentence.values[name]
     if not isinstance(value, str):
         return sentence
-    return Sentence(sentence.template, **{**sentence.values, match[1]: _change_edge(value, edge, change)})
+    return Sentence(sentence.template, **{**sentence.values, name: _change_edge(value, edge, change)})
+
+
+def _find_edge_part(template: str, edge: Literal[0, -1]) -> str:
+    """Return the name of the value that begins or ends the template; empty if a word does."""
+    if edge == 0:
+        match = _PART.match(template)
+    else:
+        match = _PART.fullmatch(template, template.rfind("%(")) if "%(" in template else None
+    return match[1] if match is not None else ""

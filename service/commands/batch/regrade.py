@@ -68,7 +68,7 @@ def regrade(
 def publish(
     batch: BatchId,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Publish even if a criterion could not be judged. It gives no marks.")
+        bool, typer.Option("--anyway", help="Also publish provisional grades, and those with an unjudged criterion.")
     ] = False,
 ) -> None:
     """Publish the newest grades of a batch: they replace older grades, and students see them."""
@@ -87,7 +87,7 @@ def publish(
 def publish_one(
     grade: GradeId,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Publish even if a criterion could not be judged. It gives no marks.")
+        bool, typer.Option("--anyway", help="Also publish provisional grades, and those with an unjudged criterion.")
     ] = False,
 ) -> None:
     """Publish the newest grade of one submission: it replaces older grades, and the student sees it."""

@@ -317,7 +317,9 @@ def _choose_first(query: Select[Any], *order: ColumnElement[int]) -> Select[Any]
     return ordered_jobs.with_for_update(of=_JOB, skip_locked=True, key_share=True)
 
 
+@cache
 def _build_recent_jobs() -> CTE:
+    """Return the recently started jobs, always as the same object, which a statement can contain several times."""
     return select_recent_jobs(bindparam("share_since"), bindparam("share_until")).cte("recent")
 
 

@@ -251,6 +251,15 @@ def test_one_student_does_not_hold_up_the_others_in_another_batch(store: Store) 
     assert [_claim(store).job_id for _ in range(3)] == [begun, newer, older]
 
 
+def test_jobs_with_and_without_a_batch_are_compared_if_all_their_students_were_served(store: Store) -> None:
+    accept_batch(store, "first", [grading_request("ada"), grading_request("bob")], (), max_attempts=3)
+    _claim(store)
+    _claim(store)
+    in_batch = accept_batch(store, "second", [grading_request("ada", "print(2)\n")], (), max_attempts=3).jobs[0].job_id
+    alone = accept_one(store, "bob", lane=JobQueue.BATCH).job_id
+    assert [_claim(store).job_id for _ in range(2)] == [in_batch, alone]
+
+
 def test_starts_from_before_the_clock_was_set_back_are_no_share(store: Store) -> None:
     ended = accept_batch(store, "ended", [grading_request("ada")], (), max_attempts=3)
     claim = _claim(store)
