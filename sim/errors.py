@@ -17,7 +17,7 @@ class RobomarkError(Exception):
     """
 
     def __init__(self, sentence: str = "", /, **values: object) -> None:
-        self.message = Sentence(sentence, **values) if isinstance(sentence, str) else sentence
+        self.message = sentence if isinstance(sentence, Sentence) else Sentence(sentence, **values)
         super().__init__(str(self.message))
 
 
