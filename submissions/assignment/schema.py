@@ -11,7 +11,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -149,6 +158,14 @@ class SweepTable(StrictTable):
         return tuple(sorted(_check_range(value, condition.most, condition.least)))
 
 
+#: Kinds of a value that may be a number or a table. Pydantic adds them to the path of a mistake.
+_NUMBER, _TABLE = "(number)", "(table)"
+
+
+def _choose_kind(value: object) -> str:
+    return _TABLE if isinstance(value, dict | BaseModel) else _NUMBER
+
+
 class DrawTable(StrictTable):
     """The numbers of trials that are drawn from a pool: at least, and at most before the value is exact."""
 
@@ -167,7 +184,10 @@ class ScenarioTable(StrictTable):
     second_poses: tuple[Annotated[tuple[float, float, float], Entries("[x, y, heading]")], ...] = ()
     choose: Literal["each", "random", "shuffled"] = "each"
     pool: int | None = Field(default=None, ge=2, le=1000)  # the number of trials over which criteria are defined
-    trials: Annotated[int, Field(ge=1, le=1000)] | DrawTable = 1
+    trials: Annotated[
+        Annotated[int, Field(ge=1, le=1000), Tag(_NUMBER)] | Annotated[DrawTable, Tag(_TABLE)],
+        Discriminator(_choose_kind),
+    ] = 1
     seconds: float = Field(default=60.0, gt=0, le=3600)
     light_noise: Levels = Field(default=(0.0,), min_length=1)
     motor_noise: Levels = Field(default=(0.0,), min_length=1)
@@ -294,7 +314,7 @@ _TYPES: Mapping[str, str] = {
 
 def describe_problem(schema: type[BaseModel], details: ErrorDetails) -> TableProblem:
     """Convert a pydantic error to a sentence and its path in the table."""
-    path = tuple(part for part in details["loc"])
+    path = tuple(part for part in details["loc"] if part not in (_NUMBER, _TABLE))
     name = str(path[-1]) if path else ""
     context: Mapping[str, Any] = details.get("ctx", {})
     kind = details["type"]

@@ -12,9 +12,9 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from itertools import groupby
 from types import MappingProxyType
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -347,4 +347,4 @@ def _escape(text: str) -> str:
         character if character.isprintable() or character in _JOINERS else " " if character.isspace() else ""
         for character in text
     ]
-    return escape("".join(characters))
+    return escape("".join(characters), quote=False)
