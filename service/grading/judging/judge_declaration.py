@@ -11,12 +11,12 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from responders.function_calls import CallResult, CallResults
-from service.grading.grade import CriterionResult, Evidence, TrialResult, VisibleFeedback
+from service.grading.grade import CriterionResult, Evidence, PoolValue, TrialResult, VisibleFeedback
 from service.grading.judging.message_parts import add_hidden_note, add_place, describe_early_end, describe_place
 from service.grading.judging.outcome import Outcome, combine_outcomes, compute_marks, round_to_steps
 from service.grading.judging.source_answers import SourceAnswers
 from service.grading.pools.pool_sentences import describe_for_staff, describe_for_students
-from service.grading.pools.pool_values import ERROR_OF_GRADE, compute_share
+from service.grading.pools.pool_values import ERROR_OF_GRADE, compute_pool_share
 from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
@@ -124,20 +124,16 @@ def judge_by_trial(
     """Combine the outcomes of the trials into a result. ``get_outcome`` gets the trial's index in the grade."""
     trials = case.list_trials(criterion)
     outcomes = [get_outcome(index, trial) for index, trial in trials]
-    pool = case.assignment.find_pool(criterion)
-    pool_value = None
+    share, pool_value = _compute_share(criterion, case, outcomes)
     message, shown = summarise(trials, outcomes), _build_visible_feedback(trials, outcomes, summarise)
-    if pool is None:
-        share = combine_outcomes(outcomes, criterion.over)
-        share = round_to_steps(share) if has_hidden(trials) else share
-    else:
-        error = ERROR_OF_GRADE / len(case.assignment.chance_criteria)
-        share, pool_value = compute_share(criterion, outcomes, pool.trials, error)
+    if pool_value is not None:
         public_value = describe_for_students(pool_value, criterion.over)
         pool_value = describe_for_staff(pool_value, criterion.over)
         message = join_sentences(message, pool_value.note)
         if shown is not None:
             shown = replace(shown, message=join_sentences(shown.message, public_value.note), pool=public_value)
+    if has_hidden(trials) and not criterion.bands:
+        share = round_to_steps(share)
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,
@@ -155,6 +151,15 @@ def judge_by_trial(
             index: outcome.findings for (index, _), outcome in zip(trials, outcomes, strict=True) if outcome.findings
         },
     )
+
+
+def _compute_share(criterion: Criterion, case: Case, outcomes: Sequence[Outcome]) -> tuple[Fraction, PoolValue | None]:
+    """Return the fraction of the marks, and the value over the pool if the criterion has one."""
+    pool = case.assignment.find_pool(criterion)
+    if pool is None:
+        return combine_outcomes(outcomes, criterion.over), None
+    error = ERROR_OF_GRADE / len(case.assignment.chance_criteria)
+    return compute_pool_share(criterion, outcomes, pool.trials, error)
 
 
 def judge_once(criterion: Criterion, outcome: Outcome) -> CriterionResult:

@@ -19,7 +19,7 @@ from submissions.criteria import Criterion
 ERROR_OF_GRADE = Fraction(1, 20)
 
 
-def compute_share(
+def compute_pool_share(
     criterion: Criterion, outcomes: Sequence[Outcome], size: int, error: Fraction
 ) -> tuple[Fraction, PoolValue]:
     """Return the fraction of a criterion's marks, and its value over the pool.

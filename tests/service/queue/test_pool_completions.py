@@ -11,7 +11,7 @@ from sqlalchemy import select, update
 
 from acting import Notices, machine, service_on
 from builders import grading_request
-from pools import LUCKY, pool_assignment, pool_request
+from pools import ASSIGNMENT, LUCKY, pool_assignment, pool_request
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
 from service.operations import appeals, regrades
@@ -184,3 +184,12 @@ def test_white_space_gains_nothing(
             trials = results.load_grade(session, accepted.job_id).trials
         hashes.add(tuple(each.recording.sha256 for each in trials))
     assert len(hashes) == 1
+
+
+def test_marks_over_hidden_trials_reveal_no_exact_share(tmp_path: Path, runner: TrialRunner) -> None:
+    without_bands = ASSIGNMENT.replace("bands = [[0.5, 2], [0.7, 4]]\n", "")
+    assignment = pool_assignment(tmp_path / "short-pool", without_bands)
+    (result,) = grade(pool_request(assignment).submission, assignment, runner=runner).criteria
+    assert result.pool is not None
+    assert float(result.marks) == pytest.approx(4 * round(result.pool.least * 20) / 20)
+    assert result.pool.least * 30 == pytest.approx(round(result.pool.least * 30))

@@ -11,7 +11,7 @@ from service.grading.grade import PoolValue
 from service.grading.judging.judge import JUDGES
 from service.grading.judging.outcome import Outcome
 from service.grading.pools.pool_sentences import describe_for_staff, describe_for_students
-from service.grading.pools.pool_values import compute_share
+from service.grading.pools.pool_values import compute_pool_share
 from submissions.criteria import SCHEMAS
 from submissions.criteria.ending import Finishes
 
@@ -56,7 +56,7 @@ def outcomes(scores: str) -> list[Outcome]:
 def test_marks_are_decided_when_all_values_within_the_bounds_give_the_same(
     over: str, bands: tuple[tuple[float, float], ...], drawn: str, size: int, share: Fraction, is_decided: bool
 ) -> None:
-    actual_share, value = compute_share(finishes(over, bands), outcomes(drawn), size, ERROR)
+    actual_share, value = compute_pool_share(finishes(over, bands), outcomes(drawn), size, ERROR)
     assert (actual_share, value.is_decided, value.drawn) == (share, is_decided, len(drawn))
     assert 0 <= value.least <= value.most <= 1
     assert value.is_exact is (len(drawn) == size)
