@@ -57,6 +57,7 @@ class TableLine:
     published_at: datetime | None
     elsewhere: bool  # submitted in a batch other than the table's
     newer_attempt: int | None  # the newest later attempt that is not graded or over a limit
+    provisional: bool = False  # the marks depend on a pool of which not all trials were run
 
     @property
     def share(self) -> Decimal:
@@ -140,6 +141,7 @@ def load_table_lines(
             Job.published_at,
             SubmissionRow.batch_id,
             current_grades.select_newer_attempt(),
+            Job.provisional,
         )
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
@@ -195,9 +197,8 @@ def load_review_counts(session: Session, lines: Sequence[TableLine]) -> dict[str
 def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden_names: HiddenNames) -> TableLine:
     job_id, submission_id, student, name, source, assignment, state, verdict, marks, max_marks, *remaining = row
     error, cancelled_for, superseded_by, *remaining = remaining
-    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, batch_id, newer_attempt = (
-        remaining
-    )
+    suspect, staff_only, days_late, attempt, sha256, started_at, graded_at, published_at, *remaining = remaining
+    batch_id, newer_attempt, is_provisional = remaining
     has_hidden_name = assignment in hidden_names.assignments
     duration: timedelta | None = None if started_at is None or graded_at is None else graded_at - started_at
     return TableLine(
@@ -223,6 +224,7 @@ def _build_line(row: tuple[Any, ...], own_batch: str | None, hidden_names: Hidde
         published_at=published_at,
         elsewhere=own_batch is not None and batch_id != own_batch,
         newer_attempt=newer_attempt,
+        provisional=is_provisional,
     )
 
 
