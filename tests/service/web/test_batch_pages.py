@@ -13,7 +13,7 @@ from dataclasses import replace
 from decimal import Decimal
 
 import pytest
-from sqlalchemy import event, func, select
+from sqlalchemy import event, func, select, update
 from starlette.testclient import TestClient
 
 import report_builders
@@ -29,13 +29,14 @@ from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import result_cache
 from service.store.installation import load_secret
 from service.store.states import BatchState, JobState, Standing
-from service.store.tables.grades import TrialRow
+from service.store.tables.grades import CriterionResultRow, TrialRow
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Batch, Job
 from service.version import hash_grader
 from submissions.assignment.folder import locate_assignment_folder
 from submissions.student_identity import RejectedSubmission, Student
 from web import COURSE, Web, grade_all, submit, words
+from web_world import make_world
 from zips import zipped
 
 HOME = "/courses/1"
@@ -454,3 +455,19 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
         422,
         True,
     )
+
+
+def test_a_provisional_grade_is_marked_in_lists_and_held_back(web: Web) -> None:
+    world = make_world(web)
+    grace, batch = web.browser(world.grace), f"/courses/1/batches/{world.values['batch_id']}"
+    assert "provisional" not in words(grace.get(batch).text)
+    pool = {"size": 200, "drawn": 4, "least": 0.1, "most": 0.9, "is_decided": False}
+    with web.store.transaction() as session:
+        session.execute(update(Job).values(provisional=True))
+        session.execute(update(CriterionResultRow).values(pool=pool))
+    assert "provisional" in words(grace.get(batch).text)
+    assert "provisional" in words(grace.get(f"/courses/1/grades/{world.values['job_id']}").text)
+    preview = words(grace.get(f"{batch}/publish").text)
+    assert "1 grade is provisional: not all trials were run yet (running them takes" in preview
+    appeal = words(web.browser(world.ada).get("/courses/1/mine/submissions/1/appeal").text)
+    assert "Run all trials now" in appeal
