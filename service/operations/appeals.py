@@ -126,7 +126,7 @@ def _expedite(service: Service, actor: Actor, course_id: int, submission_id: int
         row = _require_student_submission(session, actor, course_id, submission_id)
         if not appeals.can_appeal(session, submission_id):
             raise UsageError("you can appeal after your grade is visible")
-        pool_progress.expedite(session, submission_id, row.enrolment_id, service.settings.max_attempts, now(session))
+        pool_progress.expedite(session, submission_id, row.enrolment_id, now(session))
         audit.record_action(session, actor.name, "run all trials", "submission", str(submission_id))
 
 

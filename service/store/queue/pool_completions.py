@@ -34,8 +34,8 @@ def is_completion(session: Session, job_id: str) -> bool:
     return bool(session.scalar(select(Job.whole_pools).where(Job.id == job_id)))
 
 
-def replace_provisional_grade(session: Session, completion: Job, current_time: datetime) -> bool:
-    """Put the grade of a finished completion in the place of the provisional one. Return whether students see a change.
+def replace_provisional_grade(session: Session, completion: Job, current_time: datetime) -> None:
+    """Put the grade of a finished completion in the place of the provisional one.
 
     The provisional grade may have been published on purpose. Then the exact one is published too, unless it is lower:
     a student keeps marks that were published. A grade that was replaced meanwhile is not replaced again.
@@ -44,12 +44,10 @@ def replace_provisional_grade(session: Session, completion: Job, current_time: d
     is_lower = (completion.marks or 0) < (provisional.marks or 0)
     if provisional.standing is Standing.KEPT or (provisional.published_at is not None and is_lower):
         completion.standing = Standing.KEPT
-        return False
+        return
     new_standing, provisional.standing = provisional.standing, Standing.KEPT
     # The database rejects a second standing job of a submission, even within a transaction.
     session.flush()
     completion.standing = new_standing
-    if provisional.published_at is None:
-        return False
-    completion.published_at, completion.published_by = current_time, provisional.published_by
-    return completion.marks != provisional.marks
+    if provisional.published_at is not None:
+        completion.published_at, completion.published_by = current_time, provisional.published_by

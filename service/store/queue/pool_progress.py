@@ -35,7 +35,10 @@ class PoolProgress:
 
 
 def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
-    """Return the progress of the standing grade of a submission; None if it depends on no pool or does not exist."""
+    """Return the progress of the standing grade of a submission.
+
+    None if there is no grade, if it depends on no pool, or if it was published and its exact grade is lower.
+    """
     query = select(Job).where(Job.submission_id == submission_id, Job.standing == Standing.STANDS)
     job = session.scalars(query).first()
     if job is None or job.state != JobState.DONE:
@@ -46,6 +49,8 @@ def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
         return None
     if not job.provisional:
         return PoolProgress(True)
+    if _has_lower_exact_grade(session, job.id):
+        return None
     completion = _find_completion(session, job.id)
     is_expedited = completion is not None and completion.lane is JobQueue.INTERACTIVE
     return PoolProgress(False, is_expedited, _estimate_seconds(job, pools))
@@ -69,29 +74,34 @@ def _estimate_seconds(job: Job, pools: Sequence[Any]) -> float:
     return spent_seconds / min(shares, default=1.0)
 
 
-def expedite(
-    session: Session, submission_id: int, enrolment_id: int, max_attempts: int, current_time: datetime
-) -> None:
+def expedite(session: Session, submission_id: int, enrolment_id: int, current_time: datetime) -> None:
     """Run the completion of the standing grade of a submission as soon as possible, for its student.
 
     A completion that was given up or cancelled is queued again.
 
     Raises:
-        UsageError: The grade is not provisional, or the student already waits for a completion.
+        UsageError: All trials were run already, or the student waits for a completion.
     """
     lock_submissions(session, SubmissionRow.enrolment_id == enrolment_id)
     query = select(Job).where(Job.submission_id == submission_id, Job.standing == Standing.STANDS, Job.provisional)
     job = session.scalars(query).first()
     if job is None:
         raise UsageError("these marks are exact already: all trials were run")
+    if _has_lower_exact_grade(session, job.id):
+        raise UsageError("all trials were run already; your published marks stay, because they are higher")
     if _count_expedited(session, enrolment_id):
         raise UsageError("all trials of one of your grades are being run; wait for the result")
     completion = _find_completion(session, job.id)
     if completion is None:
         completion = build_completion(job)
-        completion.max_attempts = max_attempts
         enqueue(session, completion, current_time)
     completion.lane, completion.notified_at = JobQueue.INTERACTIVE, None
+
+
+def _has_lower_exact_grade(session: Session, job_id: str) -> bool:
+    """Return whether a completion of this standing grade ended and did not replace it."""
+    query = select(Job.id).where(Job.regrade_of == job_id, Job.whole_pools, Job.state == JobState.DONE)
+    return session.scalar(query.limit(1)) is not None
 
 
 def _find_completion(session: Session, job_id: str) -> Job | None:

@@ -19,10 +19,10 @@ from service.operations.context import Actor
 from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.settings import Settings
 from service.store.batches.intake import AcceptedSubmission, accept_submission
-from service.store.engine import Store
+from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.installation import load_secret
-from service.store.queue import jobs
+from service.store.queue import jobs, pool_progress
 from service.store.states import JobQueue, JobState, Role, Standing
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
@@ -128,6 +128,12 @@ def test_completion_never_lowers_published_marks(
     now_standing = standing(store, accepted.submission_id)
     assert (now_standing.id != accepted.job_id) is is_replaced
     assert (now_standing.published_by, now_standing.published_at is not None) == ("grace", True)
+    with store.reading() as session:
+        progress = pool_progress.load_progress(session, accepted.submission_id)
+    assert (progress is not None) is is_replaced
+    refusal = "exact already" if is_replaced else "your published marks stay"
+    with store.transaction() as session, pytest.raises(UsageError, match=refusal):
+        pool_progress.expedite(session, accepted.submission_id, now_standing.enrolment_id, now(session))
 
 
 def test_a_student_has_all_trials_run_once_at_a_time(
