@@ -1,7 +1,7 @@
 """Prints each measurement beside its budget. Ratios and CPU time, so that a busy machine changes little.
 
-``python -m benchmarks queue rows`` measures these two alone. ``chaos``, ``capacity``, ``costs`` and ``plans`` are no
-part of the table (docs/performance.md).
+``python -m benchmarks queue rows`` measures these two alone. ``chaos``, ``capacity``, ``costs``, ``plans`` and
+``pools`` are no part of the table (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from benchmarks import (
     memory,
     original,
     plots,
+    pools,
     queue,
     ready,
     rows,
@@ -59,7 +60,7 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
 #: The groups of ``--quick``, which together take less than a minute.
 _QUICK = ("calibration", "commands", "grading", "simulator", "original", "growth")
 _OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType(
-    {"capacity": capacity.main, "chaos": chaos.main, "costs": costs.main, "plans": rows.main}
+    {"capacity": capacity.main, "chaos": chaos.main, "costs": costs.main, "plans": rows.main, "pools": pools.main}
 )
 
 

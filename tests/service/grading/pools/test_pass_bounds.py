@@ -2,63 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.grading.pools.pass_bounds import DrawnSample, PassBounds, bound_passes
+from benchmarks.harness.pool_decisions import compute_fixed_number, decide_exactly
+from service.grading.pools.pass_bounds import PassBounds, bound_passes
 
 ERROR = Fraction(1, 20)
-
-
-@dataclass(frozen=True)
-class Decisions:
-    """By the number of passes in the pool: the probability of a wrong decision, and the mean number of trials."""
-
-    wrong: np.ndarray
-    trials: np.ndarray
-
-
-def decide_exactly(size: int, boundary: float) -> Decisions:
-    """Follow every order of every pool until the boundary is decided, by dynamic programming over the passes."""
-    needed = ceil(round(boundary * size, 9))
-    decided = np.zeros((size + 1, size + 1), int)
-    for drawn in range(1, size + 1):
-        for passes in range(drawn + 1):
-            decided[drawn, passes] = decide(size, drawn, passes, needed)
-    pool = np.arange(size + 1)
-    passing = pool >= needed
-    weights = np.zeros((size + 1, size + 1))
-    weights[:, 0] = 1
-    wrong, trials = np.zeros(size + 1), np.zeros(size + 1)
-    for drawn in range(1, size + 1):
-        chance = np.clip((pool[:, None] - np.arange(size + 1)) / (size - drawn + 1), 0, 1)
-        trials += weights.sum(1)
-        passed = weights * chance
-        weights -= passed
-        weights[:, 1:] += passed[:, :-1]
-        for decision, is_wrong in ((1, ~passing), (-1, passing)):
-            ended = decided[drawn] == decision
-            wrong += np.where(is_wrong, weights[:, ended].sum(1), 0)
-            weights[:, ended] = 0
-    return Decisions(wrong, trials)
-
-
-def decide(size: int, drawn: int, passes: int, needed: int) -> int:
-    """Return 1 if all numbers of passes below ``needed`` are rejected, -1 if all others are, otherwise 0.
-
-    The posterior has one maximum, so the most plausible number on each side decides.
-    """
-    sample, least, most = DrawnSample(size, drawn, passes, ERROR), passes, size - drawn + passes
-    best = min(max(passes * (size + 1) // drawn, least), most)
-    below, above = min(best, needed - 1), max(best, needed)
-    has_below, has_above = below >= least and not sample.rejects(below), above <= most and not sample.rejects(above)
-    return 0 if has_below == has_above else 1 if has_above else -1
 
 
 @pytest.mark.parametrize(
@@ -74,7 +27,7 @@ def decide(size: int, drawn: int, passes: int, needed: int) -> int:
     ],
 )
 def test_wrong_decisions_are_rarer_than_declared(size: int, boundary: float) -> None:
-    decisions = decide_exactly(size, boundary)
+    decisions = decide_exactly(size, boundary, ERROR)
     assert decisions.wrong.max() <= float(ERROR)
     assert decisions.trials.max() < size
     if (size, boundary) == (200, 0.7):
@@ -82,6 +35,16 @@ def test_wrong_decisions_are_rarer_than_declared(size: int, boundary: float) -> 
         clear = [*range(101), *range(180, 201)]
         assert decisions.trials[clear].min() >= 4
         assert decisions.trials[clear].max() == pytest.approx(36.3, abs=0.5)
+
+
+def test_fixed_number_holds_on_both_sides_of_the_boundary() -> None:
+    assert compute_fixed_number(10, 0.5, 10, 0.0) == 1
+    # By hand, for 4 or 6 passes in 10: one trial is wrong with 0.4. Of two, one pass is enough, so 4 passes are decided
+    # wrongly with 2/3. Of three, two are needed, which is wrong with 1/3 on both sides.
+    assert compute_fixed_number(10, 0.5, 4, 0.41) == 1
+    assert compute_fixed_number(10, 0.5, 6, 0.34) == 3
+    # Nobody can tell 4 from 5 by fewer trials than all.
+    assert compute_fixed_number(10, 0.5, 5, 0.05) == 10
 
 
 @given(st.integers(2, 60), st.data())
