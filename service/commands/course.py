@@ -19,7 +19,7 @@ from service.operations import people as people_operations
 from service.operations.assignments import CourseAssignment
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.policies import ExtensionRequest, PolicyLimits
-from service.operations.types import CountedAttempt
+from service.operations.types import CompletionRule, CountedAttempt
 from sim.errors import UsageError
 from submissions.roster import parse_time
 from submissions.student_identity import list_known_students, read_people
@@ -52,11 +52,15 @@ def policy(
         CountedAttempt | None,
         typer.Option(help="The attempt of each student that counts, for all assignments of the course."),
     ] = None,
+    completion_rule: Annotated[
+        CompletionRule | None,
+        typer.Option(help="Exact marks that replace published provisional ones: only higher ones, or all."),
+    ] = None,
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
     """Set the deadline and attempts, replacing the earlier policy. Without options, show the policy.
 
-    The attempt that counts is set separately: other options do not change it, and it does not replace a policy.
+    The rules for grades are set separately: other options do not change them, and they do not replace a policy.
     """
     limits = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
     if drop and limits != PolicyLimits():
@@ -69,8 +73,12 @@ def policy(
             policies.set_policy(service, actor, course_id, assignment, limits)
         if counted_attempt is not None:
             policies.set_counted_attempt(service, actor, course_id, counted_attempt)
+        if completion_rule is not None:
+            policies.set_completion_rule(service, actor, course_id, completion_rule)
         _show_policies(
-            policies.list_policies(service, actor, course_id), policies.show_counted_attempt(service, actor, course_id)
+            policies.list_policies(service, actor, course_id),
+            policies.show_counted_attempt(service, actor, course_id),
+            policies.show_completion_rule(service, actor, course_id),
         )
 
 
@@ -204,12 +212,16 @@ def _parse_due(text: str | None) -> datetime | None:
         raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
 
 
-def _show_policies(limits_by_assignment: dict[str, PolicyLimits], counted_attempt: CountedAttempt) -> None:
+def _show_policies(
+    limits_by_assignment: dict[str, PolicyLimits], counted_attempt: CountedAttempt, completion_rule: CompletionRule
+) -> None:
     print_json(
         policies=[{"assignment": name, **asdict(allowed)} for name, allowed in limits_by_assignment.items()],
         counted_attempt=counted_attempt,
+        completion_rule=completion_rule,
     )
     print_line(f"attempt that counts: {counted_attempt.value}")
+    print_line(f"exact marks that replace published provisional ones: {completion_rule.value}")
     if not limits_by_assignment:
         print_line("no policy: all submissions are marked at any time")
         return

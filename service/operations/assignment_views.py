@@ -13,7 +13,7 @@ from service.store.courses import open_assignments, policies
 from service.store.courses.policies import PolicyLimits
 from service.store.grades import own_gradings
 from service.store.grades.own_gradings import OwnGrading
-from service.store.states import CountedAttempt, Role
+from service.store.states import CompletionRule, CountedAttempt, Role
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_in_catalogue
@@ -21,12 +21,13 @@ from submissions.assignment.reader import find_in_catalogue
 
 @dataclass(frozen=True, slots=True)
 class CourseAssignments:
-    """The assignments of a course, their own policies, the default policy, and the rule for the attempt that counts."""
+    """The assignments of a course, their own policies, the default policy, and the rules for grades."""
 
     prepared: list[CourseAssignment]
     policies: Mapping[str, PolicyLimits]
     policy: PolicyLimits
     counted_attempt: CountedAttempt
+    completion_rule: CompletionRule
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +53,12 @@ def list_prepared(service: Service, actor: Actor, course_id: int) -> list[Course
 def show_all(service: Service, actor: Actor, course_id: int) -> CourseAssignments:
     """Return the assignments of a course with its policies. Raises NotFound."""
     with service.store.reading() as session:
-        counted_attempt = require_course(session, actor, course_id, Role.INSTRUCTOR).counted_attempt
+        course = require_course(session, actor, course_id, Role.INSTRUCTOR)
+        rules = course.counted_attempt, course.completion_rule
         limits_by_assignment = policies.load_policies(session, course_id)
         course_assignments = open_assignments.list_assignments(session, course_id)
     return CourseAssignments(
-        course_assignments, limits_by_assignment, limits_by_assignment.get("") or PolicyLimits(), counted_attempt
+        course_assignments, limits_by_assignment, limits_by_assignment.get("") or PolicyLimits(), *rules
     )
 
 

@@ -1,4 +1,4 @@
-"""Deadlines and attempts: the policies of a course, extensions for single students, and the attempt that counts."""
+"""Deadlines and attempts: the policies of a course, extensions for single students, and the rules for its grades."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from service.store import audit
 from service.store.courses import policies
 from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
-from service.store.states import CountedAttempt, Role
+from service.store.states import CompletionRule, CountedAttempt, Role
 
 _MAX_LATE_DAYS, _MAX_ATTEMPTS, _MAX_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
@@ -80,6 +80,22 @@ def set_counted_attempt(service: Service, actor: Actor, course_id: int, rule: Co
     with service.store.transaction() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR).counted_attempt = rule
         audit.record_action(session, actor.name, "policy", "course", str(course_id), counted_attempt=rule.value)
+
+
+def show_completion_rule(service: Service, actor: Actor, course_id: int) -> CompletionRule:
+    """Return the rule of a course for published provisional grades. Raises NotFound."""
+    with service.store.reading() as session:
+        return require_course(session, actor, course_id, Role.INSTRUCTOR).completion_rule
+
+
+def set_completion_rule(service: Service, actor: Actor, course_id: int, rule: CompletionRule) -> None:
+    """Set whether exact marks replace lower ones only, or all, that were published. Raises NotFound.
+
+    The rule applies to all pools of the course that are completed from now on.
+    """
+    with service.store.transaction() as session:
+        require_course(session, actor, course_id, Role.INSTRUCTOR).completion_rule = rule
+        audit.record_action(session, actor.name, "policy", "course", str(course_id), completion_rule=rule.value)
 
 
 def drop_policy(service: Service, actor: Actor, course_id: int, assignment: str) -> None:

@@ -22,6 +22,13 @@ class CountedAttempt(StrEnum):
     BEST = "best"  # the highest share of the maximum marks; the latest of several
 
 
+class CompletionRule(StrEnum):
+    """The rule of a course for provisional grades that were published before their pools were complete."""
+
+    HIGHER = "higher"  # only higher exact marks replace the published ones
+    EXACT = "exact"  # exact marks replace the published ones in any case
+
+
 class CredentialKind(StrEnum):
     """The kind of a credential."""
 

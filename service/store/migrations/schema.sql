@@ -36,7 +36,7 @@ CREATE INDEX ix_audit_subject_subject_id ON audit (subject, subject_id);
 CREATE TABLE course (
 	id INTEGER NOT NULL, 
 	name TEXT NOT NULL, 
-	created_at DATETIME NOT NULL, counted_attempt VARCHAR(16) DEFAULT 'latest' NOT NULL, 
+	created_at DATETIME NOT NULL, counted_attempt VARCHAR(16) DEFAULT 'latest' NOT NULL, completion_rule VARCHAR(16) DEFAULT 'higher' NOT NULL, 
 	CONSTRAINT pk_course PRIMARY KEY (id), 
 	CONSTRAINT uq_course_name UNIQUE (name)
 );
@@ -490,8 +490,8 @@ CREATE TABLE "open_assignment" (
 	names_hidden BOOLEAN NOT NULL, 
 	batch_id VARCHAR(12), 
 	CONSTRAINT pk_open_assignment PRIMARY KEY (id), 
-	CONSTRAINT fk_open_assignment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
+	CONSTRAINT fk_open_assignment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
 	CONSTRAINT fk_open_assignment_batch_id_batch FOREIGN KEY(batch_id) REFERENCES batch (id)
 );
 

@@ -10,7 +10,9 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store.states import JobQueue, Standing
+from service.store.states import CompletionRule, JobQueue, Standing
+from service.store.tables.courses import Course
+from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
 
 
@@ -37,12 +39,14 @@ def is_completion(session: Session, job_id: str) -> bool:
 def replace_provisional_grade(session: Session, completion: Job, current_time: datetime) -> None:
     """Put the grade of a finished completion in the place of the provisional one.
 
-    The provisional grade may have been published on purpose. Then the exact one is published too, unless it is lower:
-    a student keeps marks that were published. A grade that was replaced meanwhile is not replaced again.
+    The provisional grade may have been published on purpose. Then the exact one is published too. If it is lower, the
+    student keeps the marks that were published, unless the course says otherwise. A grade that was replaced meanwhile
+    is not replaced again.
     """
     provisional = session.get_one(Job, completion.regrade_of, with_for_update={"key_share": True})
     is_lower = (completion.marks or 0) < (provisional.marks or 0)
-    if provisional.standing is Standing.KEPT or (provisional.published_at is not None and is_lower):
+    keeps_marks = provisional.published_at is not None and is_lower and not is_always_replaced(session, provisional)
+    if provisional.standing is Standing.KEPT or keeps_marks:
         completion.standing = Standing.KEPT
         return
     new_standing, provisional.standing = provisional.standing, Standing.KEPT
@@ -51,3 +55,9 @@ def replace_provisional_grade(session: Session, completion: Job, current_time: d
     completion.standing = new_standing
     if provisional.published_at is not None:
         completion.published_at, completion.published_by = current_time, provisional.published_by
+
+
+def is_always_replaced(session: Session, provisional: Job) -> bool:
+    """Return whether the course replaces this grade, once it was published, also with lower exact marks."""
+    query = select(Course.completion_rule).join(Enrolment, Enrolment.course_id == Course.id)
+    return session.scalars(query.where(Enrolment.id == provisional.enrolment_id)).one() is CompletionRule.EXACT

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store.locks import lock_submissions
 from service.store.queue.jobs import enqueue
-from service.store.queue.pool_completions import build_completion
+from service.store.queue.pool_completions import build_completion, is_always_replaced
 from service.store.states import UNFINISHED, JobQueue, JobState, Standing
 from service.store.tables.grades import CriterionResultRow
 from service.store.tables.submissions import Job, SubmissionRow
@@ -27,11 +27,13 @@ class PoolProgress:
     """Whether the marks of a grade are exact, and otherwise the completion that makes them exact.
 
     ``seconds`` is the estimated CPU time of all trials. ``is_expedited`` says whether somebody waits for it.
+    ``can_decrease`` says whether lower exact marks would replace these.
     """
 
     is_exact: bool
     is_expedited: bool = False
     seconds: float = 0.0
+    can_decrease: bool = False
 
 
 def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
@@ -53,7 +55,8 @@ def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
         return None
     completion = _find_completion(session, job.id)
     is_expedited = completion is not None and completion.lane is JobQueue.INTERACTIVE
-    return PoolProgress(False, is_expedited, _estimate_seconds(job, pools))
+    can_decrease = job.published_at is None or is_always_replaced(session, job)
+    return PoolProgress(False, is_expedited, _estimate_seconds(job, pools), can_decrease)
 
 
 def estimate_completion_seconds(session: Session, provisional_jobs: Sequence[Job]) -> float:

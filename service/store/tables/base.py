@@ -17,6 +17,7 @@ from service.store.columns import ExactDecimal, SafeJson, SafeText, UtcDateTime
 from service.store.states import (
     BatchState,
     CancelReason,
+    CompletionRule,
     CountedAttempt,
     CredentialKind,
     JobQueue,
@@ -56,6 +57,7 @@ class Base(DeclarativeBase):
         Any: SafeJson(),
         Role: _build_enum_type(Role),
         CountedAttempt: _build_enum_type(CountedAttempt),
+        CompletionRule: _build_enum_type(CompletionRule),
         CredentialKind: _build_enum_type(CredentialKind),
         JobQueue: _build_enum_type(JobQueue),
         JobState: _build_enum_type(JobState),

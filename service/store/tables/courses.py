@@ -14,7 +14,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import generate_id
-from service.store.states import CountedAttempt
+from service.store.states import CompletionRule, CountedAttempt
 from service.store.tables.base import Base
 
 
@@ -26,9 +26,12 @@ class Course(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(unique=True)
     created_at: Mapped[datetime]
-    # Older releases add courses without the column.
+    # Older releases add courses without these columns.
     counted_attempt: Mapped[CountedAttempt] = mapped_column(
         default=CountedAttempt.LATEST, server_default=CountedAttempt.LATEST.value
+    )
+    completion_rule: Mapped[CompletionRule] = mapped_column(
+        default=CompletionRule.HIGHER, server_default=CompletionRule.HIGHER.value
     )
 
 

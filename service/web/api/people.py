@@ -12,7 +12,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
 from service.operations import people, people_views, policies
 from service.operations.policies import ExtensionRequest, PolicyLimits
-from service.operations.types import CountedAttempt, JobState, Role
+from service.operations.types import CompletionRule, CountedAttempt, JobState, Role
 from service.web.access import RowNumber
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
@@ -142,6 +142,20 @@ class CountedAttemptBody(CountedAttemptShape):
     """The new rule for the attempt that counts."""
 
 
+class CompletionRuleShape(Shape):
+    """The rule of a course for provisional marks that were published before all trials were run."""
+
+    completion_rule: CompletionRule = Field(
+        description="`higher`: only higher exact marks replace them. `exact`: the exact marks replace them in any case."
+    )
+
+    model_config = build_example_config(completion_rule="exact")
+
+
+class CompletionRuleBody(CompletionRuleShape):
+    """The new rule for published provisional marks."""
+
+
 class PolicyBody(PolicyShape):
     """The new policy."""
 
@@ -250,6 +264,20 @@ def set_counted_attempt(access: ManageAccess, context: Context, body: CountedAtt
     """Set which attempt of each student counts. The rule applies to all assignments and to existing submissions."""
     policies.set_counted_attempt(context.service, access.actor, access.course_id, body.counted_attempt)
     return CountedAttemptShape(counted_attempt=body.counted_attempt)
+
+
+@router.get("/courses/{course_id}/policies/completion-rule")
+def show_completion_rule(access: ReadAccess, context: Context) -> CompletionRuleShape:
+    """Return whether exact marks replace published provisional marks that are higher."""
+    rule = policies.show_completion_rule(context.service, access.actor, access.course_id)
+    return CompletionRuleShape(completion_rule=rule)
+
+
+@router.put("/courses/{course_id}/policies/completion-rule")
+def set_completion_rule(access: ManageAccess, context: Context, body: CompletionRuleBody) -> CompletionRuleShape:
+    """Set whether exact marks replace published provisional marks that are higher, for trials that end from now on."""
+    policies.set_completion_rule(context.service, access.actor, access.course_id, body.completion_rule)
+    return CompletionRuleShape(completion_rule=body.completion_rule)
 
 
 @router.delete("/courses/{course_id}/policies", status_code=204, response_class=Response)

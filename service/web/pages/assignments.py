@@ -16,7 +16,7 @@ from service.operations import assignment_uploads, assignment_views, assignments
 from service.operations.assignment_uploads import AssignmentAlreadySeen, UploadRequest
 from service.operations.assignments import CourseAssignment
 from service.operations.policies import PolicyLimits
-from service.operations.types import CountedAttempt, Role
+from service.operations.types import CompletionRule, CountedAttempt, Role
 from service.pending_uploads import clean_file_name
 from service.web.access import CourseInstructor, ReaderInCourse
 from service.web.api_uploads import MAX_ASSIGNMENT_BYTES
@@ -185,6 +185,15 @@ def set_counted_attempt(
     return RedirectResponse(f"{_build_path(access, '')}?done=counted-attempt", 303)
 
 
+@router.post("/policy/completion-rule")
+def set_completion_rule(
+    access: CourseInstructor, context: Context, completion_rule: Annotated[CompletionRule, Form()]
+) -> Response:
+    """Set whether exact marks replace published provisional ones that are higher, in the whole course."""
+    policies.set_completion_rule(context.service, access.actor, access.course_id, completion_rule)
+    return RedirectResponse(f"{_build_path(access, '')}?done=completion-rule", 303)
+
+
 @router.post("/assignments/{assignment}/no-policy")
 def drop_policy(access: CourseInstructor, context: Context, assignment: AssignmentId) -> Response:
     """Delete an assignment's own policy, so that the course's default applies."""
@@ -214,6 +223,7 @@ def _render_list(
         policies=view.policies,
         policy=view.policy,
         counted_attempt=view.counted_attempt,
+        completion_rule=view.completion_rule,
         rejection=rejection or [],
         asks_to_replace=asks_to_replace,
         done=done,

@@ -205,6 +205,16 @@ def _counted_attempt(rule: str, refused: tuple[int, str] | None = None) -> Row:
     )
 
 
+def _completion_rule(rule: str, refused: tuple[int, str] | None = None) -> Row:
+    return Row(
+        policies.set_completion_rule,
+        ("policy/completion-rule", {"completion_rule": rule}),
+        ("PUT", "policies/completion-rule", {"completion_rule": rule}),
+        f"course policy --completion-rule {rule}",
+        refused=refused,
+    )
+
+
 ROWS = {
     "set the policy of a course": _policy(),
     "set the policy of an assignment": _policy(assignment="echo-responder"),
@@ -212,6 +222,8 @@ ROWS = {
     "set a deadline in another century": _policy((422, ""), due="2999-01-02T10:00"),
     "count the best attempt": _counted_attempt("best"),
     "count the worst attempt": _counted_attempt("worst", (422, "")),
+    "replace published marks with lower exact ones": _completion_rule("exact"),
+    "replace published marks with lower ones only": _completion_rule("lower", (422, "")),
     "drop a policy": Row(
         policies.drop_policy,
         ("assignments/echo-responder/no-policy", {}),

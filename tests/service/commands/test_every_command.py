@@ -87,7 +87,7 @@ SHOWING = {
     "course list": "courses",
     "course hide-names echo-responder": "assignment names_hidden",
     "course show-names echo-responder": "assignment names_hidden",
-    "course policy": "policies counted_attempt",
+    "course policy": "policies counted_attempt completion_rule",
     "course extend ada -a echo-responder --more-attempts 1": "student assignment due more_attempts",
     "course enrol people.csv": "students",
     "course prepare echo-responder": "assignment title open opened_at closed_at version",

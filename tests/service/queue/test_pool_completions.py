@@ -14,7 +14,7 @@ from builders import grading_request
 from pools import ASSIGNMENT, LUCKY, pool_assignment, pool_request
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from service.operations import appeals, regrades
+from service.operations import appeals, policies, regrades
 from service.operations.context import Actor
 from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.settings import Settings
@@ -23,7 +23,7 @@ from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.installation import load_secret
 from service.store.queue import jobs, pool_progress
-from service.store.states import JobQueue, JobState, Role, Standing
+from service.store.states import CompletionRule, JobQueue, JobState, Role, Standing
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
 from sim.errors import UsageError
@@ -110,12 +110,21 @@ def test_only_exact_grades_are_published_unless_asked(
     assert standing(store, accepted.submission_id).published_at is not None
 
 
-@pytest.mark.parametrize(("published_marks", "is_replaced"), [("0", True), ("99", False)])
-def test_completion_never_lowers_published_marks(
+@pytest.mark.parametrize(
+    ("rule", "published_marks", "is_replaced"),
+    [
+        (CompletionRule.HIGHER, "0", True),
+        (CompletionRule.HIGHER, "99", False),
+        (CompletionRule.EXACT, "0", True),
+        (CompletionRule.EXACT, "99", True),
+    ],
+)
+def test_completion_lowers_published_marks_only_if_the_course_says_so(
     store: Store,
     service_settings: Settings,
     runner: TrialRunner,
     assignment: Assignment,
+    rule: CompletionRule,
     published_marks: str,
     is_replaced: bool,
 ) -> None:
@@ -123,7 +132,12 @@ def test_completion_never_lowers_published_marks(
     graded(store, service_settings, runner)
     counts = regrades.publish_one(service_on(store), machine("grace"), 1, accepted.job_id, includes_held_back=True)
     assert counts.published == 1
+    policies.set_completion_rule(service_on(store), machine("grace"), 1, rule)
     set_marks(store, accepted.job_id, published_marks)
+    with store.reading() as session:
+        before = pool_progress.load_progress(session, accepted.submission_id)
+    assert before is not None
+    assert before.can_decrease is (rule is CompletionRule.EXACT)
     graded(store, service_settings, runner)
     now_standing = standing(store, accepted.submission_id)
     assert (now_standing.id != accepted.job_id) is is_replaced

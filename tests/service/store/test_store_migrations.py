@@ -32,7 +32,7 @@ from service.store.migrate import apply_migrations, build_alembic_config
 from service.store.queue import jobs
 from service.store.recorded_schema import read_statements
 from service.store.revision import find_newest_revision, load_current_revision, load_schema_state, read_revision
-from service.store.states import CancelReason, CountedAttempt, JobState, Role, Standing
+from service.store.states import CancelReason, CompletionRule, CountedAttempt, JobState, Role, Standing
 from service.store.tables import METADATA
 from service.store.tables.courses import Course, OpenAssignment
 from service.store.tables.grades import Artifact, CriterionResultRow, TrialRow
@@ -199,6 +199,7 @@ def test_a_database_of_release_0_2_0_is_upgraded_with_its_data(service_settings:
             }
             assert session.scalar(select(func.count()).where(Job.published_at.is_not(None))) == 2
             assert set(session.scalars(select(Course.counted_attempt))) == {CountedAttempt.LATEST}
+            assert set(session.scalars(select(Course.completion_rule))) == {CompletionRule.HIGHER}
             (batch,) = session.scalars(select(Batch.id).where(Batch.name == "class"))
             assert batches.load_batch(session, batch).refusals == (RejectedSubmission("odd.txt", "is odd."),)
             published = [line for line in job_lines.load_job_lines(session, batch) if line.marks is not None]

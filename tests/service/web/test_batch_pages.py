@@ -471,3 +471,7 @@ def test_a_provisional_grade_is_marked_in_lists_and_held_back(web: Web) -> None:
     assert "1 grade is provisional: not all trials were run yet (running them takes" in preview
     appeal = words(web.browser(world.ada).get("/courses/1/mine/submissions/1/appeal").text)
     assert "Run all trials now" in appeal
+    assert "They can be higher or lower." in appeal
+    answer = submit(grace, "/courses/1/policy/completion-rule", {"completion_rule": "exact"})
+    assert '<option value="exact" selected>' in grace.get(answer.headers["location"]).text
+    submit(grace, "/courses/1/policy/completion-rule", {"completion_rule": "higher"})
