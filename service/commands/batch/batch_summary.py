@@ -37,6 +37,7 @@ def list_remarks(line: JobLine) -> list[str]:
         f"{line.unjudged} criteria not judged": line.unjudged > 0,
         f"{line.set_by_hand} criteria adjusted by staff": line.set_by_hand > 0,
         f"{line.surprises} trials explained in the log": line.surprises > 0,
+        "provisional": line.provisional,
         "suspect": line.suspect is not None,
         f"attempt {line.newer_attempt} is newer and does not count": line.newer_attempt is not None,
         "published": line.published_at is not None,

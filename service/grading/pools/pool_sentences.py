@@ -26,7 +26,7 @@ def describe_for_staff(value: PoolValue, rule: Over) -> PoolValue:
 
 def describe_for_students(value: PoolValue, rule: Over) -> PoolValue:
     """Return the value that students see if trials of the pool are hidden, with a note."""
-    least, most = _round_outwards(value, _STUDENTS_STEP)
+    least, most = round_outwards(value, _STUDENTS_STEP)
     if value.is_exact:
         note = Sentence("Exact: all trials of the pool were run.")
         return replace(value, least=least / 100, most=most / 100, note=note)
@@ -37,7 +37,7 @@ def describe_for_students(value: PoolValue, rule: Over) -> PoolValue:
 
 
 def _describe_bounds(value: PoolValue, rule: Over, step: int) -> str:
-    least, most = _round_outwards(value, step)
+    least, most = round_outwards(value, step)
     match rule:
         case "share":
             return Sentence(
@@ -56,7 +56,7 @@ def _describe_bounds(value: PoolValue, rule: Over, step: int) -> str:
     return ""
 
 
-def _round_outwards(value: PoolValue, step: int) -> tuple[int, int]:
+def round_outwards(value: PoolValue, step: int) -> tuple[int, int]:
     """Return the bounds in per cent, as multiples of ``step`` that are still true."""
     least = step * math.floor(round(value.least * 100 / step, 6))
     return least, step * math.ceil(round(value.most * 100 / step, 6))

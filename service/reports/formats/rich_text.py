@@ -11,7 +11,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from service.grading.grade import Grade
+from service.grading.grade import Grade, PoolValue
+from service.grading.pools.pool_sentences import round_outwards
 from service.reports.diagnosis import describe_outcome, diagnose, format_excerpt
 from service.reports.display_text import format_decimal, to_display_text, to_one_line
 from service.reports.faults import FaultGroup, describe_other_faults
@@ -62,10 +63,15 @@ def render_rich_report(view: View, submission: Submission | None = None) -> Rend
 def build_marks_table(grade: Grade, explained_criteria: frozenset[int] = frozenset()) -> Table:
     """Return the criteria with marks and messages, and the total as footer.
 
-    Criteria in ``explained_criteria`` have no message.
+    Criteria in ``explained_criteria`` have no message. If marks depend on pools of trials, columns show their status.
     """
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=(0, 1), expand=False)
     table.add_column("Marks", justify="right", no_wrap=True, footer=_format_total(grade))
+    has_pools = any(result.pool is not None for result in grade.criteria)
+    if has_pools:
+        table.add_column("Status", footer=Text("provisional" if grade.is_provisional else "exact"))
+        table.add_column("Trials", justify="right", no_wrap=True)
+        table.add_column("Value", justify="right", no_wrap=True)
     table.add_column("Criterion", footer=Text("Total"))
     for index, result in enumerate(grade.criteria):
         has_full_marks = result.marks >= result.max_marks
@@ -76,8 +82,18 @@ def build_marks_table(grade: Grade, explained_criteria: frozenset[int] = frozens
         )
         if result.for_staff:
             message.append(f"\nFor staff: {to_display_text(result.for_staff, 600)}")
-        table.add_row(marks, Group(Text(to_one_line(result.title)), *([message] if message else [])))
+        pool_cells = _format_pool_cells(result.pool) if has_pools else []
+        table.add_row(marks, *pool_cells, Group(Text(to_one_line(result.title)), *([message] if message else [])))
     return table
+
+
+def _format_pool_cells(pool: PoolValue | None) -> list[str]:
+    """Return the status of marks, the trials that were run, and the bounds of the value in per cent."""
+    if pool is None:
+        return ["", "", ""]
+    least, most = round_outwards(pool, 1)
+    bounds = f"{pool.least:.1%}" if pool.is_exact else f"{least}% to {most}%"
+    return ["exact" if pool.is_exact else "provisional", f"{pool.drawn} of {pool.size}", bounds]
 
 
 def _format_total(grade: Grade) -> Text:

@@ -13,14 +13,16 @@ from dataclasses import replace
 import pandas
 import pytest
 from junitparser import Error, Failure, JUnitXml, Skipped
+from rich.console import Console
 
 import report_builders as build
 from builders import accept_one
 from moodle_rules import feedback_taken_by_moodle, imported_by_moodle
 from paths import DATA
 from service.batch_rows import build_row, describe_missing_grade
-from service.grading.grade import Grade
+from service.grading.grade import Grade, PoolValue
 from service.reports.formats import FORMATS
+from service.reports.formats.rich_text import build_marks_table
 from service.reports.html import render_refusal_page
 from service.reports.rows import ReportPage, TableRow, describe_missing_part, select_student_rows
 from service.store.batches import job_lines
@@ -88,6 +90,47 @@ def test_a_table_is_as_it_is_kept(form: str) -> None:
     """After an intended change, write the result of ``written`` to the file."""
     kept = (GOLDEN / f"{form}{FORMATS[form].suffix}").read_bytes().decode("utf-8")
     assert written(form) == kept
+
+
+@pytest.mark.parametrize("form", ["csv", "csv-long"])
+def test_marks_over_a_pool_have_columns_for_their_status_trials_and_bounds(form: str) -> None:
+    assert ADA.grade is not None
+    first, *others = ADA.grade.criteria
+    pools = {"s1": PoolValue(200, 40, 0.62, 0.815, is_decided=False), "s2": PoolValue(200, 200, 0.7, 0.7, True)}
+    rows = [
+        replace(row, grade=replace(ADA.grade, criteria=(replace(first, pool=pools[row.student.id]), *others)))
+        for row in (ADA, MARY)
+    ]
+    render = FORMATS[form].table
+    assert render is not None
+    lines = list(csv.DictReader(io.StringIO(render([*rows, ZOE]))))
+    suffix = f": {first.id}" if form == "csv" else ""
+    lines = [line for line in lines if form == "csv" or line["criterion"] in (first.id, "")]
+    columns = [f"{name}{suffix}" for name in ("status", "trials_run", "pool", "value_low", "value_high")]
+    assert [[line[column] for column in columns] for line in lines] == [
+        ["provisional", "40", "200", "0.6200", "0.8150"],
+        ["exact", "200", "200", "0.7000", "0.7000"],
+        [""] * 5,
+    ]
+    assert [line["reason"] for line in lines] == [ADA.reason, MARY.reason, ZOE.reason]
+    # Only the criterion with a pool has these columns.
+    assert sum("trials_run" in column for column in lines[0]) == 1
+
+
+def test_the_table_of_marks_shows_their_status_in_a_terminal() -> None:
+    assert ADA.grade is not None
+    first, *others = ADA.grade.criteria
+    pool = PoolValue(200, 40, 0.626, 0.813, is_decided=False)
+    text = _print_table(replace(ADA.grade, criteria=(replace(first, pool=pool), *others)))
+    assert re.search(r"Marks +Status +Trials +Value +Criterion", text)
+    assert re.search(r"provisional +40 of 200 +62% to 82% ", text)
+    assert "Status" not in _print_table(ADA.grade)
+
+
+def _print_table(grade: Grade) -> str:
+    console = Console(width=400, record=True, file=io.StringIO())
+    console.print(build_marks_table(grade))
+    return console.export_text()
 
 
 def _rows_of_csv(text: str) -> dict[str, str]:
