@@ -30,6 +30,7 @@ def render_plain_text(view: View, submission: Submission | None = None) -> str:
     """Return the grade in lines of at most 96 characters, without colour or control codes."""
     grade = view.grade
     title = f"{to_one_line(grade.assignment_title)}: {to_one_line(grade.student, 60)}"
+    title += " (provisional marks)" if grade.is_provisional else ""
     verdict_words, diagnosis = describe_grade(grade), diagnose(grade, submission)
     lines = [title, "=" * min(len(title), _WIDTH), ""]
     lines += [f"{format_decimal(grade.marks)} of {format_decimal(grade.max_marks)} marks; {verdict_words.short}", ""]
@@ -64,6 +65,8 @@ def _format_criterion(result: CriterionResult, message: str) -> list[str]:
     marks = f"{format_decimal(result.marks)}/{format_decimal(result.max_marks)}"
     lines = _wrap_text(f"{marks:>9}  {to_one_line(result.title)}", indent=11)
     lines += _wrap_text(" " * 11 + message, indent=11) if message else []
+    if result.pool is not None and result.pool.note:
+        lines += _wrap_text(f"{' ' * 11}{result.pool.note}", indent=11)
     staff = f"For staff: {to_display_text(result.for_staff, 600)}"
     return [*lines, *(_wrap_text(" " * 11 + staff, indent=11) if result.for_staff else [])]
 

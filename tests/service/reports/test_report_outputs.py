@@ -13,7 +13,8 @@ from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobCosts, JobLimits
-from service.grading.grade import Cost, build_unjudged_notes
+from service.grading.grade import Cost, PoolValue, build_unjudged_notes
+from service.grading.pools.pool_sentences import describe_for_staff
 from service.reports.formats import FORMATS
 from service.reports.formats.csv_output import render_marks_csv
 from service.reports.formats.gradescope import build_gradescope_document, render_gradescope
@@ -64,6 +65,25 @@ def test_every_report_says_what_the_channel_lost_and_why() -> None:
     assert (messages[1]["lost"], messages[1]["distance"], messages[1]["angle"]) == ("out of range", 1600.2, 3.0)
     assert messages[4]["arrived_as"] == "PY::7"
     assert "The channel" not in render_plain_text(build_staff_view(build.line_follower_grade()))
+
+
+def test_the_first_line_of_a_text_report_says_that_marks_are_provisional() -> None:
+    grade = build.shape_grade()
+    first, *others = grade.criteria
+    reports = []
+    for drawn in (40, 200):
+        value = PoolValue(200, drawn, 0.7, 0.7 if drawn == 200 else 0.8, is_decided=False)
+        pool = describe_for_staff(value, "share")
+        reports.append(
+            render_plain_text(
+                build_staff_view(replace(grade, criteria=(replace(first, pool=pool), *others)))
+            ).splitlines()
+        )
+    title = render_plain_text(build_staff_view(grade)).splitlines()[0]
+    assert [lines[0] for lines in reports] == [f"{title} (provisional marks)", title]
+    provisional, exact = (" ".join(" ".join(lines).split()) for lines in reports)
+    assert "Provisional: 40 of 200 trials were run. With 95 % certainty, 70 to 80 % of all trials" in provisional
+    assert "Exact: all 200 trials of the pool were run." in exact
 
 
 @pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document] + ["page", "terminal"])
