@@ -10,6 +10,7 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from service.store import audit, outbox
 from service.store.states import CompletionRule, JobQueue, Standing
 from service.store.tables.courses import Course
 from service.store.tables.people import Enrolment
@@ -54,10 +55,22 @@ def replace_provisional_grade(session: Session, completion: Job, current_time: d
     session.flush()
     completion.standing = new_standing
     if provisional.published_at is not None:
-        completion.published_at, completion.published_by = current_time, provisional.published_by
+        _publish(session, provisional, completion, current_time)
+
+
+def _publish(session: Session, provisional: Job, completion: Job, current_time: datetime) -> None:
+    """Release the exact grade to the student who could see the provisional one, and report it as a publication."""
+    completion.published_at, completion.published_by = current_time, provisional.published_by
+    worker = completion.worker or "workers"
+    audit.record_action(session, worker, "publish exact", "job", completion.id, replaced=provisional.id)
+    outbox.emit_grades_published(session, _load_course(session, completion).id, grade=completion.id, published=1)
 
 
 def is_always_replaced(session: Session, provisional: Job) -> bool:
     """Return whether the course replaces this grade, once it was published, also with lower exact marks."""
-    query = select(Course.completion_rule).join(Enrolment, Enrolment.course_id == Course.id)
-    return session.scalars(query.where(Enrolment.id == provisional.enrolment_id)).one() is CompletionRule.EXACT
+    return _load_course(session, provisional).completion_rule is CompletionRule.EXACT
+
+
+def _load_course(session: Session, job: Job) -> Course:
+    query = select(Course).join(Enrolment, Enrolment.course_id == Course.id)
+    return session.scalars(query.where(Enrolment.id == job.enrolment_id)).one()

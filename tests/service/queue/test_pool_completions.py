@@ -18,12 +18,15 @@ from service.operations import appeals, policies, regrades
 from service.operations.context import Actor
 from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.settings import Settings
+from service.store import audit
 from service.store.batches.intake import AcceptedSubmission, accept_submission
 from service.store.engine import Store, now
 from service.store.grades import results
 from service.store.installation import load_secret
+from service.store.people import webhooks
 from service.store.queue import jobs, pool_progress
 from service.store.states import CompletionRule, JobQueue, JobState, Role, Standing
+from service.store.tables.courses import Delivery
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
 from sim.errors import UsageError
@@ -133,6 +136,8 @@ def test_completion_lowers_published_marks_only_if_the_course_says_so(
     counts = regrades.publish_one(service_on(store), machine("grace"), 1, accepted.job_id, includes_held_back=True)
     assert counts.published == 1
     policies.set_completion_rule(service_on(store), machine("grace"), 1, rule)
+    with store.transaction() as session:
+        webhooks.create_webhook(session, 1, "https://hooks.example.org/x", ["grades.published"])
     set_marks(store, accepted.job_id, published_marks)
     with store.reading() as session:
         before = pool_progress.load_progress(session, accepted.submission_id)
@@ -142,6 +147,11 @@ def test_completion_lowers_published_marks_only_if_the_course_says_so(
     now_standing = standing(store, accepted.submission_id)
     assert (now_standing.id != accepted.job_id) is is_replaced
     assert (now_standing.published_by, now_standing.published_at is not None) == ("grace", True)
+    with store.reading() as session:
+        payloads = [row.payload["data"] for row in session.scalars(select(Delivery))]
+        entries = audit.load_entries(session, "job", now_standing.id)
+    assert payloads == ([{"grade": now_standing.id, "published": 1}] if is_replaced else [])
+    assert ("publish exact" in [each.action for each in entries]) is is_replaced
     with store.reading() as session:
         progress = pool_progress.load_progress(session, accepted.submission_id)
     assert (progress is not None) is is_replaced
