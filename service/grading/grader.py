@@ -35,7 +35,7 @@ from sim.robot import get_robot
 from sim.sentences import Sentence
 from sim.world import Noise
 from submissions.assignment.definition import Assignment, Trial, WorldSpec
-from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed
+from submissions.seeds import PUBLIC_SECRET, SeedSource, compute_child_seed
 from submissions.submission import PART_FILES, Submission
 
 _MEGABYTE = 1 << 20
@@ -78,7 +78,7 @@ def grade(
     submission: Submission,
     assignment: Assignment,
     *,
-    secret: Secret = PUBLIC_SECRET,
+    secret: SeedSource = PUBLIC_SECRET,
     observe: ProgressObserver | None = None,
     runner: TrialRunner | None = None,
     extent: PoolExtent = PoolExtent.WHOLE,

@@ -38,7 +38,7 @@ from submissions.magics import Flags
 from submissions.marked_run import RunChoice, choose_run
 from submissions.notebook_python import extract_python
 from submissions.part_fitting import find_missing_part
-from submissions.seeds import PUBLIC_SECRET, Secret, compute_child_seed, compute_world_seed
+from submissions.seeds import PUBLIC_SECRET, SeedSource, compute_child_seed
 from submissions.submission import SECOND_PROGRAM, Notebook, Part, Submission
 
 
@@ -112,7 +112,7 @@ class RunPlan:
         )
 
 
-def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PUBLIC_SECRET) -> RunPlan:
+def plan_run(submission: Submission, assignment: Assignment, secret: SeedSource = PUBLIC_SECRET) -> RunPlan:
     """Return the plan for grading ``submission``, with seeds derived from ``secret``.
 
     Raises:
@@ -135,7 +135,7 @@ def plan_run(submission: Submission, assignment: Assignment, secret: Secret = PU
         own_files=submission.files,
         notes=(*plan.notes, *read_diagrams(notebook).problems),
         submission=submission.sha256,
-        child_seed=compute_child_seed(compute_world_seed(secret, assignment.id), submission.sha256),
+        child_seed=compute_child_seed(secret.compute_seed(assignment.id), submission.sha256),
     )
 
 

@@ -19,7 +19,7 @@ from submissions.assignment.limits import DEFAULT_LIMITS, Limits
 from submissions.assignment.scenario import Scenario as Scenario
 from submissions.assignment.scenario import Visibility as Visibility
 from submissions.criteria import AnyCriterion
-from submissions.seeds import PUBLIC_SECRET, Secret, compute_world_seed
+from submissions.seeds import PUBLIC_SECRET, SeedSource, SeedTable, build_seed_table
 from submissions.sweep import Coordinates
 
 
@@ -121,7 +121,7 @@ class Assignment:
         scenarios = (each for each in self.scenarios if not criterion.scenarios or each.id in criterion.scenarios)
         return next((each for each in scenarios if each.draw is not None), None)
 
-    def trials(self, secret: Secret = PUBLIC_SECRET) -> Iterator[Trial]:
+    def trials(self, secret: SeedSource = PUBLIC_SECRET) -> Iterator[Trial]:
         """Return all trials for the installation with this secret, in a fixed order; those of a pool as drawn."""
         for scenario in self.scenarios:
             levels = list(
@@ -161,7 +161,7 @@ class Assignment:
                     else None,
                 )
 
-    def _order_trials(self, scenario: Scenario, count: int, secret: Secret) -> Sequence[int]:
+    def _order_trials(self, scenario: Scenario, count: int, secret: SeedSource) -> Sequence[int]:
         """Return the numbers of the scenario's trials in the order in which a grading runs them.
 
         The order of a pool depends on the secret and is the same for all students.
@@ -171,7 +171,7 @@ class Assignment:
         chance = RandomStream(self.seed(scenario, 0, secret), "order of the pool")
         return sorted(range(count), key=chance.integer)
 
-    def _order_poses(self, scenario: Scenario, secret: Secret) -> Sequence[int | None]:
+    def _order_poses(self, scenario: Scenario, secret: SeedSource) -> Sequence[int | None]:
         """Return the pose numbers in the order of the trials; None if each trial draws its own."""
         places = range(len(scenario.poses))
         match scenario.choose:
@@ -183,10 +183,18 @@ class Assignment:
             case "each":
                 return places
 
-    def seed(self, scenario: Scenario, index: int, secret: Secret = PUBLIC_SECRET) -> int:
+    def seed(self, scenario: Scenario, index: int, secret: SeedSource = PUBLIC_SECRET) -> int:
         """Return the seed of a trial's world, the same for every student."""
+        return secret.compute_seed(self._name_world(scenario, index))
+
+    def build_seed_table(self, secret: SeedSource) -> SeedTable:
+        """Return all seeds of a grading, with which another installation can repeat it."""
+        names = (self._name_world(each, index) for each in self.scenarios for index in range(each.trial_count))
+        return build_seed_table(secret, (self.id, *names))
+
+    def _name_world(self, scenario: Scenario, index: int) -> str:
         assignment_secret = "" if scenario.visibility == "visible" else self.secret
-        return compute_world_seed(secret, f"{self.id}\n{scenario.id}\n{index}\n{assignment_secret}")
+        return f"{self.id}\n{scenario.id}\n{index}\n{assignment_secret}"
 
 
 def _compute_start_pose(scenario: Scenario, pose_index: int, sweep_values: Mapping[str, float], seed: int) -> Pose:
