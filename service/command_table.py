@@ -98,7 +98,23 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "answer": Command("appeals:answer", "Answer and close an appeal."),
             },
         ),
-        "verify": Command("verify:verify", "Repeat a stored grading and compare."),
+        "verify": Command("verify:verify", "Repeat a stored grading and compare, or check a statement."),
+        "statement": Command("statements:statement", "Write the signed statement on a published grade."),
+        "log": CommandGroup(
+            "File and check the log of statements.",
+            {
+                "head": Command("statements:write_head", "Write the signed head of the log, to be filed elsewhere."),
+                "check": Command("statements:check_log", "Check the log and all published grades."),
+            },
+        ),
+        "keys": CommandGroup(
+            "Manage the keys that sign statements.",
+            {
+                "list": Command("statements:list_keys", "List the public keys."),
+                "rotate": Command("statements:rotate_key", "Sign with a new key from now on."),
+                "revoke": Command("statements:revoke_key", "Revoke a key that others may know."),
+            },
+        ),
         "course": CommandGroup(
             "Manage courses: policies, students, assignments.",
             {

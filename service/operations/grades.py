@@ -15,7 +15,7 @@ from service.store.batches import job_lines
 from service.store.batches.job_lines import JobLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import retry_conflicts
-from service.store.grades import comments, marking_history, overrides
+from service.store.grades import comments, marking_history, overrides, statements
 from service.store.grades.comments import MAX_COMMENT_LENGTH, CommentLine
 from service.store.grades.marking_history import MarkingStep
 from service.store.grades.overrides import MAX_REASON_LENGTH, CriterionMarks, parse_marks
@@ -135,12 +135,14 @@ def _change_marks(
     service: Service, actor: Actor, course_id: int, job_id: str, change: Callable[[Session], None]
 ) -> Marking:
     def change_grade(session: Session) -> None:
-        if session.get_one(Job, job_id).state is not JobState.DONE:
+        job = session.get_one(Job, job_id)
+        if job.state is not JobState.DONE:
             raise Conflict("%(job)s has no grade", job=job_id)
         try:
             change(session)
         except overrides.MarksChanged as error:
             raise Conflict(error.message) from None
+        statements.state_change(session, job.submission_id)
 
     return _apply_change(service, actor, course_id, job_id, change_grade)
 

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session, aliased
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
 from service.store.locks import lock_jobs, lock_submissions
+from service.store.statement_log import erase_entries
 from service.store.states import UNFINISHED, JobState, Role
 from service.store.tables.courses import AssignmentVersion, Extension, OpenAssignment
 from service.store.tables.grades import Appeal, Comment, Override
@@ -182,6 +183,7 @@ def _delete_marked(session: Session) -> None:
     lock_jobs(session, is_marked_or_copy)
     session.execute(update(Job).where(is_marked_or_copy).values(copied_from=None))
     session.execute(update(Job).where(is_marked).values(regrade_of=None))
+    erase_entries(session, _marked_submission_ids)
     # Deleting a job also deletes its trials, results and artifacts.
     session.execute(delete(Job).where(is_marked))
     for column in (Override.submission_id, Comment.submission_id, Appeal.submission_id):

@@ -32,6 +32,8 @@ Prepare = Callable[[Web], dict[str, str]]
 INTERFACES = ("page", "api", "command")
 #: Columns left out of the comparison: the actor, secrets, and the size of compressed data that contains times.
 _UNEQUAL = frozenset({"actor", "published_by", "sha256", "secret", "size"})
+#: Columns of signed statements, which have random keys and salts.
+_SIGNED = frozenset({"leaf_sha256", "salt", "opening_key", "key_id", "signature", "payload"})
 _TIME = re.compile(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d:\d\d(\.\d+)?(\+00:00)?")
 _ID = re.compile(rf"(?<![A-Za-z0-9])[{ALPHABET}]{{{LENGTH}}}(?![A-Za-z0-9])")
 
@@ -235,7 +237,9 @@ def _plain(row: dict[str, Any], known: frozenset[str]) -> str:
             return value
         return _ID.sub(lambda match: match[0] if match[0] in known else "new", _TIME.sub("a time", value))
 
-    return str({name: plain(value) for name, value in row.items() if name not in _UNEQUAL})
+    if "private_hex" in row:
+        return "a random key"
+    return str({name: plain(value) for name, value in row.items() if name not in _UNEQUAL | _SIGNED})
 
 
 def _build_address(prefix: str, path: str) -> str:

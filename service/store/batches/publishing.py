@@ -13,7 +13,7 @@ from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.grades import current_grades, overrides
+from service.store.grades import current_grades, overrides, statements
 from service.store.locks import lock_jobs, lock_submissions
 from service.store.queue.pool_progress import estimate_completion_seconds
 from service.store.states import UNFINISHED, JobState, Standing
@@ -117,6 +117,7 @@ def _publish_grades(
         job.standing = Standing.STANDS
     for job in plan.released:
         job.published_at, job.published_by = current_time, actor
+    statements.state_publication(session, [job.id for job in plan.released])
     return plan.counts
 
 

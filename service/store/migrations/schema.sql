@@ -490,8 +490,8 @@ CREATE TABLE "open_assignment" (
 	names_hidden BOOLEAN NOT NULL, 
 	batch_id VARCHAR(12), 
 	CONSTRAINT pk_open_assignment PRIMARY KEY (id), 
-	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_course_id_course FOREIGN KEY(course_id) REFERENCES course (id), 
+	CONSTRAINT fk_open_assignment_assignment_version_id_assignment_version FOREIGN KEY(assignment_version_id) REFERENCES assignment_version (id), 
 	CONSTRAINT fk_open_assignment_batch_id_batch FOREIGN KEY(batch_id) REFERENCES batch (id)
 );
 
@@ -514,5 +514,39 @@ CREATE INDEX ix_credential_token_id ON credential (token_id);
 CREATE INDEX ix_job_waiting ON job (state, lane, batch_id, queued_at, id, enrolment_id, due_at) WHERE state = 'queued';
 
 CREATE INDEX ix_job_started_at_lane_batch_id_enrolment_id ON job (started_at, lane, batch_id, enrolment_id);
+
+CREATE TABLE statement_key (
+	id VARCHAR(16) NOT NULL, 
+	public_hex VARCHAR(64) NOT NULL, 
+	private_hex VARCHAR(64), 
+	created_at DATETIME NOT NULL, 
+	retired_at DATETIME, 
+	revoked_at DATETIME, 
+	CONSTRAINT pk_statement_key PRIMARY KEY (id)
+);
+
+CREATE TABLE statement_entry (
+	number INTEGER NOT NULL, 
+	leaf_sha256 VARCHAR(64) NOT NULL, 
+	made_at DATETIME NOT NULL, 
+	submission_id INTEGER, 
+	job_id VARCHAR(12), 
+	salt VARCHAR(64), 
+	opening_key VARCHAR(64), 
+	key_id VARCHAR(16), 
+	signature VARCHAR(128), 
+	payload BLOB, 
+	CONSTRAINT pk_statement_entry PRIMARY KEY (number)
+);
+
+CREATE INDEX ix_statement_entry_submission_id ON statement_entry (submission_id);
+
+CREATE TABLE statement_head (
+	id INTEGER NOT NULL, 
+	size INTEGER NOT NULL, 
+	root_sha256 VARCHAR(64) NOT NULL, 
+	made_at DATETIME NOT NULL, 
+	CONSTRAINT pk_statement_head PRIMARY KEY (id)
+);
 
 INSERT INTO schema_compatibility VALUES (1, '0019')

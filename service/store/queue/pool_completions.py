@@ -11,6 +11,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store import audit, outbox
+from service.store.grades import statements
 from service.store.states import CompletionRule, JobQueue, Standing
 from service.store.tables.courses import Course
 from service.store.tables.people import Enrolment
@@ -61,6 +62,7 @@ def replace_provisional_grade(session: Session, completion: Job, current_time: d
 def _publish(session: Session, provisional: Job, completion: Job, current_time: datetime) -> None:
     """Release the exact grade to the student who could see the provisional one, and report it as a publication."""
     completion.published_at, completion.published_by = current_time, provisional.published_by
+    statements.state_publication(session, [completion.id])
     worker = completion.worker or "workers"
     audit.record_action(session, worker, "publish exact", "job", completion.id, replaced=provisional.id)
     outbox.emit_grades_published(session, _load_course(session, completion).id, grade=completion.id, published=1)

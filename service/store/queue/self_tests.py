@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
-from service.store.grades import current_grades
+from service.store.grades import current_grades, statements
 from service.store.locks import lock_jobs, lock_submissions
 from service.store.queue import jobs
 from service.store.states import BatchState, JobQueue, Standing
@@ -69,10 +69,12 @@ def quarantine_worker(store: Store, worker: str, reason: str) -> QuarantineEffec
         sentence = f"the worker {worker} was found to grade wrongly: {reason}"
         suspect_jobs = _load_suspects(session, worker)
         reruns = [_build_rerun(session, job) for job in suspect_jobs if job.standing is not Standing.KEPT]
+        published_submissions = {job.submission_id for job in suspect_jobs if job.published_at is not None}
         for job in suspect_jobs:
             job.suspect, job.standing = sentence, Standing.KEPT
             job.published_at = job.published_by = None
         session.flush()
+        statements.state_withdrawal(session, published_submissions, sentence)
         rerun_ids = tuple(jobs.enqueue(session, job, current_time) for job in reruns)
         suspect_ids = tuple(job.id for job in suspect_jobs)
         audit.record_action(

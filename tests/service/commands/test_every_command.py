@@ -24,6 +24,7 @@ from report_builders import faulty_grade, shape_grade
 from service.command_line import load_command
 from service.command_table import COMMANDS, Command, CommandGroup
 from service.settings import Settings
+from service.store.batches import publishing
 from service.store.batches.intake import accept_batch
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
@@ -34,6 +35,7 @@ from service.store.outbox import WebhookEvent
 from service.store.people import webhooks
 from service.store.people.membership import make_instructor
 from service.store.queue import jobs
+from service.store.statement_log import list_keys
 from service.store.states import JobState
 from service.store.tables.submissions import Job
 from submissions.assignment.examples import locate_examples
@@ -76,6 +78,12 @@ SHOWING = {
     "models list": "models",
     "models compare digits digits-28": "models curves",
     "show GRADE": "job grade",
+    "statement GRADE -o statement.json": "grade output bytes",
+    "log head -o head.json": "output entries start root_sha256",
+    "log check": "entries grades older_grades filed_heads findings",
+    "keys list": "keys",
+    "keys rotate": "key public_key",
+    "keys revoke KEY": "key revoked_at",
     "mark set GRADE asks-aloud 1.5 --reason heard": "job",
     "mark excuse GRADE asks-aloud --reason ill": "job",
     "mark withdraw GRADE names-the-right-shape": "job",
@@ -202,8 +210,10 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
             appeals.open_appeal(session, session.get_one(Job, grades[0]).submission_id, "Why?")
             (waiting,) = session.scalars(select(Job.id).where(Job.state == JobState.QUEUED))
             jobs.put_aside_job(session, waiting, now(session))
+            publishing.publish_grade(session, grades[0], actor="staff")
+            (key,) = list_keys(session)
             hook, _ = webhooks.create_webhook(session, 1, "https://hooks.example.org/", [WebhookEvent.BATCH_FINISHED])
-    return folder, {"BATCH": batch.id, "GRADE": grades[0], "OVER": waiting, "HOOK": hook.id}
+    return folder, {"BATCH": batch.id, "GRADE": grades[0], "OVER": waiting, "HOOK": hook.id, "KEY": key.key.id}
 
 
 @pytest.mark.parametrize(("line", "keys"), _CASES)
