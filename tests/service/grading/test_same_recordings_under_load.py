@@ -7,8 +7,9 @@ import os
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 
 import pytest
 
@@ -34,6 +35,7 @@ _GRADINGS = textwrap.dedent("""
     print(json.dumps(recordings))
 """)
 _CORES = sorted(os.sched_getaffinity(0))
+NO_CHANGES: Mapping[str, str] = MappingProxyType({})
 #: Other instructions for the simulator: of the C library's functions, of numpy, and of OpenBLAS.
 PROCESSORS = {
     "no FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4"},
@@ -42,11 +44,11 @@ PROCESSORS = {
 }
 
 
-def _start(*, cores: list[int] = _CORES, **variables: str) -> subprocess.Popen[str]:
+def _start(variables: Mapping[str, str] = NO_CHANGES, *, cores: list[int] = _CORES) -> subprocess.Popen[str]:
     """Start the gradings in a process of their own on these cores."""
     return subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", _GRADINGS],
-        env=os.environ | variables,
+        env={**os.environ, **variables},
         stdout=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: os.sched_setaffinity(0, cores),
@@ -100,4 +102,4 @@ def test_on_a_quarter_of_one_core(expected: dict[str, list[str]]) -> None:
 
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_with_other_instructions(processor: str, expected: dict[str, list[str]]) -> None:
-    assert _finish(_start(**PROCESSORS[processor])) == expected
+    assert _finish(_start(PROCESSORS[processor])) == expected
