@@ -165,7 +165,8 @@ def apply_channel_flags(channel: Channel, flags: Mapping[str, object]) -> Channe
     if not flags:
         return channel
     from responders.channel import Channel
-    from submissions.assignment.schema import ChannelTable, read_table
+    from submissions.assignment.schema import ChannelTable
+    from submissions.assignment.table_problems import read_table
 
     values = {each.name: getattr(channel, each.name) for each in fields(Channel)}
     unused_fields = _INFRARED if flags.get("link", channel.link) == "cable" else ()

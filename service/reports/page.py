@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
-from service.language import ENGLISH, Language, translatable
+from service.language import Language, translatable
 from service.reports.diagnosis import Diagnosis, describe_finding, describe_outcome, diagnose
 from service.reports.display_text import (
     abbreviate_message,
@@ -30,9 +30,9 @@ from service.reports.plots.plot import Plot
 from service.reports.plots.sequence import MAX_CALL_STEPS, Step, iterate_inner_steps
 from service.reports.recognition_table import ClassLine, RecognitionTable, build_recognition_table
 from service.reports.replay.trial import compute_loss_time, format_moment_link
-from service.reports.robots import collect_messages, format_party_name, iterate_robots
+from service.reports.robots import collect_messages, format_party_name
+from service.reports.timeline import TimelineEntry, build_timeline
 from service.reports.verdict_sentences import (
-    EVENT_KINDS,
     VerdictWords,
     describe_channel_losses,
     describe_cost,
@@ -42,12 +42,11 @@ from service.reports.verdict_sentences import (
     format_trial_name,
 )
 from service.reports.view import View, find_worst_trial, list_scenarios
-from sim.recording import Fault, Recording, Verdict
-from sim.recording_values import collect_printed_lines, is_stationary
+from sim.recording import Recording, Verdict
+from sim.recording_values import is_stationary
 from submissions.diagram_cells import read_diagrams
 from submissions.submission import Submission
 
-_TIMELINE_FIRST, _TIMELINE_LAST = 40, 15
 _MAX_MESSAGES = 40
 _MAX_TRIALS = 250
 _NO_MOVEMENT = translatable("the robot did not move, so its path and sensors are not drawn")
@@ -75,16 +74,6 @@ class CriterionLine:
     watch: str
     for_staff: str
     pool: str  # whether the marks are exact or provisional, if they are defined over a pool
-
-
-@dataclass(frozen=True, slots=True)
-class TimelineEntry:
-    """One moment of a timeline. ``t`` is empty for a line that counts omitted moments. ``what`` names the kind."""
-
-    t: str
-    kind: str
-    what: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,32 +212,6 @@ def build_page(view: View, submission: Submission | None = None, replayed_trials
         staff=view.staff,
         withheld=view.withheld,
     )
-
-
-def build_timeline(recording: Recording, language: Language = ENGLISH) -> tuple[TimelineEntry, ...]:
-    """Return prints, speech, touches and faults by time. If there are too many, the middle is left out."""
-    moments: list[tuple[float, str, str]] = []
-    for robot, robot_recording in iterate_robots(recording):
-        prefix = "" if robot_recording is recording else f"{format_party_name(robot, language)}: "
-        moments += [(line.t, "printed", prefix + line.text) for line in collect_printed_lines(robot_recording)]
-        moments += [(line.t, "said", prefix + line.text) for line in robot_recording.spoken]
-        moments += [(touch.t, "touched", prefix + touch.what) for touch in robot_recording.touches]
-        moments += [(fault.t, _classify_fault(fault), prefix + fault.message) for fault in robot_recording.faults]
-    moments.sort(key=lambda moment: moment[0])
-    omitted = len(moments) - _TIMELINE_FIRST - _TIMELINE_LAST
-    if omitted <= 1:
-        return tuple(_build_entry(*moment, language) for moment in moments)
-    first, last = (
-        [_build_entry(*moment, language) for moment in shown_moments]
-        for shown_moments in (moments[:_TIMELINE_FIRST], moments[-_TIMELINE_LAST:])
-    )
-    gap = language.say("%(count)s more entries are not shown", count=language.format_integer(omitted))
-    return (*first, TimelineEntry("", "", "", gap), *last)
-
-
-def _classify_fault(fault: Fault) -> str:
-    """Return the kind of a fault. A time limit alone is not a fault."""
-    return "stopped" if fault.verdict is Verdict.TIME_LIMIT else "fault"
 
 
 def _build_criterion_line(
@@ -407,10 +370,6 @@ def _describe_channel_settings(trial: TrialResult, language: Language) -> str:
     return "".join(
         f"; {condition_names[condition]} {level:g}" for condition, level in trial.sweep if condition in condition_names
     )
-
-
-def _build_entry(t: float, kind: str, text: str, language: Language) -> TimelineEntry:
-    return TimelineEntry(f"{t:.2f}", kind, language.say(EVENT_KINDS[kind]), to_display_text(text, 400, lines=8))
 
 
 def _compute_share(amount: float, total: float) -> float:

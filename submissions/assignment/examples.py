@@ -20,7 +20,8 @@ from sim.recording import Verdict
 from submissions.assignment.folder import locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.assignment.reader import find_assignment, parse_toml
-from submissions.assignment.schema import Slug, describe_problem
+from submissions.assignment.schema import Slug
+from submissions.assignment.table_problems import describe_problem
 from submissions.bundle import build_submission, read_submission
 from submissions.raw_files import RawFiles, read_folder
 from submissions.strict_table import StrictTable

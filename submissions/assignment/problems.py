@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from sim.errors import AssignmentError
 from sim.readers.toml_text import read_toml
-from submissions.assignment.schema import read_table
+from submissions.assignment.table_problems import read_table
 
 _MAX_PROBLEMS = 100
 Path = tuple[str | int, ...]

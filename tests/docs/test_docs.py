@@ -33,8 +33,8 @@ from submissions.assignment.schema import (
     PartsTable,
     ScenarioTable,
     WorldTable,
-    read_table,
 )
+from submissions.assignment.table_problems import read_table
 from submissions.criteria import SCHEMAS
 from submissions.criteria.common import CriterionWithStrays
 from submissions.submission import Submission

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from service.grading.judging.judge import JUDGES
-from submissions.assignment.schema import TableProblem, read_table
+from submissions.assignment.table_problems import TableProblem, read_table
 from submissions.criteria import SCHEMAS
 
 pytestmark = pytest.mark.fast

@@ -19,9 +19,10 @@ from service.reports.html import (
     render_report_page,
     render_report_parts,
 )
-from service.reports.page import build_page, build_timeline
+from service.reports.page import build_page
 from service.reports.plots.grade_plots import draw_all_plots, list_plots
 from service.reports.replay.document import build_grade_replay
+from service.reports.timeline import build_timeline
 from service.reports.view import build_staff_view, build_student_view
 from sim.recording import Fault, Verdict
 
