@@ -22,6 +22,7 @@ _TRANSLATED_SOURCES = [
     ("reports/**.py", "python"),
     ("operations/**.py", "python"),
     ("grading/**.py", "python"),
+    ("store/batches/stage_texts.py", "python"),
 ]
 #: Sources of translated errors about submissions: the code that raises them does not know the reader.
 _ERROR_SOURCES = [

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 _BINS, _MAX_BINS = 10, 15
 _HUNDREDTH = Decimal("0.01")
-#: The default pass mark, as a fraction of all marks.
-PASS_SHARE = Decimal("0.4")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy.orm import Session
 
-from service.grading.class_statistics import PASS_SHARE, AssignmentStatistics, compute_statistics
+from service.grading.class_statistics import AssignmentStatistics, compute_statistics
+from service.grading.pass_mark import PASS_SHARE
 from service.grading.ranks import RankTable
 from service.operations.context import Actor, Service
 from service.operations.lookup import (
@@ -23,7 +24,7 @@ from service.operations.lookup import (
 )
 from service.store import audit
 from service.store.audit import AuditEntry as AuditEntry
-from service.store.batches import batch_table, batches, job_lines, publishing, rankings, regrades
+from service.store.batches import batch_table, batches, job_lines, publishing, rankings, regrade_changes
 from service.store.batches.batch_table import REFUSED as REFUSED
 from service.store.batches.batch_table import SORTS as SORTS
 from service.store.batches.batch_table import STATES as STATES
@@ -33,10 +34,11 @@ from service.store.batches.batch_table import TablePage as TablePage
 from service.store.batches.batch_table import TableRequest as TableRequest
 from service.store.batches.batches import BatchLine as BatchLine
 from service.store.batches.batches import BatchProgress as BatchProgress
+from service.store.batches.changes import Change, ChangesSummary, summarise_changes
 from service.store.batches.class_overview import ClassOverview as ClassOverview
 from service.store.batches.class_overview import compute_overviews, load_missing_students
 from service.store.batches.job_lines import JobLine as JobLine
-from service.store.batches.regrades import Change, ChangesPage
+from service.store.batches.regrade_changes import ChangesPage
 from service.store.courses import open_assignments
 from service.store.courses.hidden_names import HiddenNames
 from service.store.courses.open_assignments import CourseAssignment
@@ -100,12 +102,13 @@ class GradedView:
 
 @dataclass(frozen=True, slots=True)
 class StatusView:
-    """The complete status of a batch; ``changes`` are those of a batch of regrades."""
+    """The complete status of a batch; ``changes`` and their summary are those of a batch of regrades."""
 
     graded: GradedView
     ranks: tuple[RankTable, ...]
     changes: tuple[Change, ...]
     history: tuple[AuditEntry, ...]
+    changes_summary: ChangesSummary | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,16 +207,19 @@ def show_graded(service: Service, actor: Actor, course_id: int, batch_id: str) -
         return _load_graded_view(session, actor, course_id, batch_id, hidden_names)
 
 
-def show_status(service: Service, actor: Actor, course_id: int, batch_id: str) -> StatusView:
+def show_status(
+    service: Service, actor: Actor, course_id: int, batch_id: str, pass_share: Decimal = PASS_SHARE
+) -> StatusView:
     """Return the complete status of a batch. Raises NotFound."""
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         graded_view = _load_graded_view(session, actor, course_id, batch_id, hidden_names)
         is_regrade = graded_view.view.batch.regrade_of is not None
-        changes = regrades.load_changes(session, batch_id, hidden_names) if is_regrade else []
+        changes = regrade_changes.load_changes(session, batch_id, hidden_names, pass_share) if is_regrade else []
+        summary = summarise_changes(changes, pass_share) if is_regrade else None
         ranks = rankings.build_rank_tables(session, graded_view.lines)
         history = audit.load_entries(session, "batch", batch_id)
-    return StatusView(graded_view, tuple(ranks), tuple(changes), tuple(history))
+    return StatusView(graded_view, tuple(ranks), tuple(changes), tuple(history), summary)
 
 
 def list_grades(
@@ -270,13 +276,15 @@ def show_overview_of_table(
         return _build_overview(session, course_id, table.view.batch, table.lines, pass_share, hidden_names)
 
 
-def show_changes_page(service: Service, actor: Actor, course_id: int, batch_id: str, number: int) -> ChangesPage:
+def show_changes_page(
+    service: Service, actor: Actor, course_id: int, batch_id: str, number: int, pass_share: Decimal = PASS_SHARE
+) -> ChangesPage:
     """Return a page of the changes of a batch of regrades, different marks first. Raises NotFound."""
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return regrades.load_changes_page(session, batch_id, number, hidden_names)
+        return regrade_changes.load_changes_page(session, batch_id, number, hidden_names, pass_share)
 
 
 def is_graded(line: TableLine) -> bool:

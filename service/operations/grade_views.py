@@ -18,9 +18,10 @@ from service.reports.replay.document import build_grade_replay
 from service.reports.view import View, build_staff_view
 from service.store import audit
 from service.store.audit import AuditEntry
-from service.store.batches import batch_table, job_lines, regrades, stored_requests
+from service.store.batches import batch_table, job_lines, regrade_changes, regrades, stored_requests
+from service.store.batches.changes import Change
 from service.store.batches.job_lines import JobLine
-from service.store.batches.regrades import Change, GradingLine
+from service.store.batches.regrades import GradingLine
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
 from service.store.grades.own_gradings import OwnGrading
@@ -74,7 +75,7 @@ def show_grade(service: Service, actor: Actor, course_id: int, job_id: str, lang
         row = _require_course_job(session, actor, course_id, job_id)
         named_line = job_lines.load_job_line(session, job_id)
         line = named_line.hide_name(hidden_names)
-        change = regrades.load_change(session, job_id)
+        change = regrade_changes.load_change(session, job_id)
         gradings = regrades.load_gradings(session, row.submission_id)
         attempts = own_gradings.list_newest_gradings(session, row.enrolment_id, line.assignment)
         view = _load_staff_view(session, line, language) if line.state is JobState.DONE else None

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from decimal import Decimal
 from typing import TYPE_CHECKING, Literal
 
 from sqlalchemy.orm import Session
 
+from service.grading.pass_mark import PASS_SHARE
 from service.operations.batches import load_course_assignment
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
 from service.operations.lookup import load_names_for_actor, require_batch, require_course, require_job
 from service.store import audit, outbox
-from service.store.batches import publishing, regrades
+from service.store.batches import publishing, regrade_changes, regrades
+from service.store.batches.changes import Change as Change
+from service.store.batches.changes import ChangesSummary as ChangesSummary
+from service.store.batches.changes import CriterionChange as CriterionChange
+from service.store.batches.changes import summarise_changes as summarise_changes
 from service.store.batches.publishing import PublicationCounts as PublicationCounts
 from service.store.batches.publishing import PublicationPreview as PublicationPreview
-from service.store.batches.regrades import Change as Change
-from service.store.batches.regrades import ChangesPage as ChangesPage
-from service.store.batches.regrades import CriterionChange as CriterionChange
+from service.store.batches.regrade_changes import ChangesPage as ChangesPage
 from service.store.batches.regrades import RegradeBatch as RegradeBatch
+from service.store.batches.stage_texts import PART_LABELS as PART_LABELS
+from service.store.batches.stage_texts import STAGE_LABELS as STAGE_LABELS
+from service.store.batches.stage_texts import STAGE_MEANINGS as STAGE_MEANINGS
 from service.store.courses.assignment_versions import FrozenAssignment, freeze_assignment
 from service.store.engine import now, retry_conflicts
 from service.store.queue import jobs
@@ -64,13 +71,25 @@ def regrade_one(service: Service, actor: Actor, course_id: int, job_id: str, ass
     return new_job_id
 
 
-def list_changes(service: Service, actor: Actor, course_id: int, batch_id: str) -> list[Change]:
-    """Return the changes of a batch of regrades, by student; empty for any other batch. Raises NotFound."""
+def list_changes(
+    service: Service, actor: Actor, course_id: int, batch_id: str, pass_share: Decimal = PASS_SHARE
+) -> list[Change]:
+    """Return the changes of a batch of regrades, by student; empty for any other batch.
+
+    ``pass_share`` is the share of all marks that students need to pass. Raises NotFound.
+    """
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         require_batch(session, course_id, batch_id)
-        return regrades.load_changes(session, batch_id, hidden_names)
+        return regrade_changes.load_changes(session, batch_id, hidden_names, pass_share)
+
+
+def show_changes_summary(
+    service: Service, actor: Actor, course_id: int, batch_id: str, pass_share: Decimal = PASS_SHARE
+) -> ChangesSummary:
+    """Return the numbers of changes of a batch of regrades, by stage and boundary. Raises NotFound."""
+    return summarise_changes(list_changes(service, actor, course_id, batch_id, pass_share), pass_share)
 
 
 @retry_conflicts

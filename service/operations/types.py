@@ -4,6 +4,7 @@ Has no slow imports, so that commands can import it at start-up.
 """
 
 from service.store.states import BatchState as BatchState
+from service.store.states import ChangeStage as ChangeStage
 from service.store.states import CompletionRule as CompletionRule
 from service.store.states import CountedAttempt as CountedAttempt
 from service.store.states import CredentialKind as CredentialKind

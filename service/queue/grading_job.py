@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime, timedelta
 from enum import Enum
 from typing import TypeVar
@@ -19,6 +20,7 @@ from service.grading.grader import GradingProgress, grade
 from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.plotting import draw_plots
+from service.queue.earlier_recordings import judge_earlier_recordings
 from service.queue.lease_keeper import LeaseKeeper
 from service.settings import Settings
 from service.store.batches import stored_requests
@@ -121,6 +123,10 @@ def _grade_job(store: Store, settings: Settings, runner: TrialRunner, claim: job
                 _log.error("criterion.unjudged", criterion=result.id, cause=result.unjudged)
         _check_for_host_error(new_grade)
         prepared_grade = results.prepare_grade(new_grade)
+        explaining_files = judge_earlier_recordings(
+            store, claim.job_id, new_grade, grading_request.assignment, keeper.check
+        )
+        prepared_grade = replace(prepared_grade, files=[*prepared_grade.files, *explaining_files])
     # The work is done, so a short outage of the database must not lose it.
     _retry_while_unreachable(
         lambda: jobs.finish_job(store, claim, prepared_grade, graded_at, progress.trials_at), settings.lease_seconds

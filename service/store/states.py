@@ -1,4 +1,4 @@
-"""Enumerations of the store: roles, queues, and the states of jobs, plots, batches and grades.
+"""Enumerations of the store: roles, queues, the states of jobs, plots, batches and grades, and stages of regrades.
 
 ``job_transitions.py`` defines the transitions between job states.
 """
@@ -97,3 +97,17 @@ class Standing(StrEnum):
     STANDS = "stands"  # the one shown in reports and exports
     PROPOSED = "proposed"  # a regrade that is not published yet
     KEPT = "kept"  # replaced by another grade
+
+
+class ChangeStage(StrEnum):
+    """What changed the marks in a regrade, in the order in which the stages are compared."""
+
+    FIRST_GRADE = "first grade"  # there was no grade
+    CRITERIA = "criteria"  # the stored recordings, judged by the criteria of the new version, give the new marks
+    JUDGING = "judging"  # the stored recordings, judged by this release, give the new marks
+    SIMULATOR = "simulator"  # the same trials, simulated by this release, have other recordings
+    SECRET = "secret"  # the secret of the installation differs, and with it the seeds of the trials
+    ASSIGNMENT = "assignment"  # the new version has other trials
+    POOL = "pool"  # other trials of a pool were run
+    WORKER = "worker"  # the worker of the earlier grade was found to grade wrongly
+    UNEXPLAINED = "unexplained"  # nothing else: the program's own randomness, or the machine

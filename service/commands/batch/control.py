@@ -8,9 +8,12 @@ import typer
 
 from service.commands.installation import open_installation
 from service.commands.output import print_json, print_line
+from service.grading.pass_mark import PASS_SHARE
 from sim.errors import UsageError
 
 BatchId = Annotated[str, typer.Argument(help="The batch's id, or its first characters.")]
+PassMark = Annotated[int, typer.Option("--pass", min=0, max=100, help="The pass mark, in percent of all marks.")]
+DEFAULT_PASS_MARK = int(PASS_SHARE * 100)
 
 
 def pause(batch: BatchId) -> None:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from service.commands.batch.control import BatchId
+from service.commands.batch.control import DEFAULT_PASS_MARK, BatchId, PassMark
 from service.commands.installation import open_installation
 from service.commands.output import create_table, print_json, print_line, print_renderables
 from service.commands.statistics_tables import build_statistics, format_names
-from service.grading.class_statistics import PASS_SHARE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,9 +26,7 @@ _OUTLIER_REASONS = {
 
 def show_overview(
     batch: BatchId,
-    pass_mark: Annotated[
-        int, typer.Option("--pass", min=0, max=100, help="The pass mark, in percent of all marks.")
-    ] = int(PASS_SHARE * 100),
+    pass_mark: PassMark = DEFAULT_PASS_MARK,
 ) -> None:
     """Show marks and their distribution, criteria, causes, students who need attention, and missing submissions."""
     from service.operations import batch_views, batches

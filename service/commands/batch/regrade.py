@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.commands.batch.control import BatchId
+from service.commands.batch.control import DEFAULT_PASS_MARK, BatchId, PassMark
 from service.commands.installation import open_installation
 from service.commands.output import print_json, print_line, print_note, print_renderables
 from sim.errors import HostError
@@ -26,6 +27,7 @@ def regrade(
         str | None, typer.Option("-a", "--assignment", help="The changed assignment: its id or its folder.")
     ] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for the new grades, then show the changes.")] = False,
+    pass_mark: PassMark = DEFAULT_PASS_MARK,
 ) -> None:
     """Grade a batch again after its assignment or the grader changed; the old grades stay valid until you publish."""
     # The queue loads slowly, and publishing does not need it.
@@ -52,11 +54,13 @@ def regrade(
         configure_logging(service.settings.log_level)
         with pending_batches(service, actor, [new_batch.batch_id], new_batch.jobs) as pending_regrade:
             pending_regrade.wait_for_marks()
-            changes = operations.list_changes(service, actor, stored_batch.course_id, new_batch.batch_id)
-            print_renderables(build_changes_table(changes))
+            pass_share = Decimal(pass_mark) / 100
+            changes = operations.list_changes(service, actor, stored_batch.course_id, new_batch.batch_id, pass_share)
+            changes_summary = operations.summarise_changes(changes, pass_share)
+            print_renderables(build_changes_table(changes, changes_summary))
             print_note(f"to publish the new grades: robomark batch publish {new_batch.batch_id}")
             pending_regrade.wait_for_plots()
-    print_json(batch=new_batch.batch_id, regraded=new_batch, changes=changes)
+    print_json(batch=new_batch.batch_id, regraded=new_batch, changes=changes, changes_summary=changes_summary)
     failed_changes = [change for change in changes if change.state is JobState.DEAD]
     if failed_changes:
         raise HostError(

@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 
     from service.grading.ranks import RankTable
     from service.operations.batch_views import AuditEntry, JobLine
-    from service.operations.regrades import Change, CriterionChange
+    from service.operations.regrades import Change, ChangesSummary, CriterionChange
     from submissions.student_identity import RejectedSubmission
 
 _STYLES: Mapping[JobState, str] = MappingProxyType(
     {JobState.DONE: "green", JobState.DEAD: "red", JobState.RUNNING: "cyan", JobState.CANCELLED: "yellow"}
 )
+#: Notes on marks that cross the pass mark.
+_CROSSINGS: Mapping[str | None, str] = MappingProxyType({"up": " (now passed)", "down": " (no longer passed)"})
 
 
 def build_marks_table(lines: Sequence[JobLine], refusals: Sequence[RejectedSubmission] = ()) -> Table:
@@ -67,8 +69,8 @@ def build_refusals_table(refusals: Sequence[RejectedSubmission]) -> Table:
     return table
 
 
-def build_changes_table(changes: Sequence[Change]) -> RenderableType:
-    """Return a table with a row for each submission that a regrade changes or that needs review.
+def build_changes_table(changes: Sequence[Change], summary: ChangesSummary) -> RenderableType:
+    """Return the summary of a regrade, and a table with a row for each submission that it changes or needs review.
 
     A line below the table counts the other submissions.
     """
@@ -80,15 +82,36 @@ def build_changes_table(changes: Sequence[Change]) -> RenderableType:
         table.add_row(
             change.student,
             format_marks(change.before, change.before_max),
-            format_marks(change.after, change.after_max),
+            format_marks(change.after, change.after_max) + _CROSSINGS.get(change.crosses, ""),
             "; ".join(_format_criterion_change(criterion) for criterion in change.criteria),
             Text(change.reason, style=_STYLES.get(change.state, "")),
             change.job_id,
         )
     unchanged_count = len(changes) - len(shown_changes)
     current_count = sum(change.standing is Standing.STANDS for change in changes)
-    summary = f"{unchanged_count} of {len(changes)} unchanged; {current_count} new grades are current"
-    return Group(table, summary) if shown_changes else summary
+    count_line = f"{unchanged_count} of {len(changes)} unchanged; {current_count} new grades are current"
+    return Group(*_build_summary(summary), *([table] if shown_changes else []), count_line)
+
+
+def _build_summary(summary: ChangesSummary) -> list[RenderableType]:
+    """Return the numbers of a regrade: marks and boundaries in one line each, then a table of stages."""
+    from service.operations.regrades import STAGE_LABELS, STAGE_MEANINGS
+
+    share_line = f"share of marks: {summary.higher} higher, {summary.lower} lower, {summary.same} the same"
+    share_line += "".join(
+        f", {count} {label}"
+        for count, label in ((summary.first_grades, "first graded"), (summary.ungraded, "not graded"))
+        if count
+    )
+    boundary_line = (
+        f"boundaries: {summary.crossing_up} now reach {100 * float(summary.pass_share):g} %, "
+        f"{summary.crossing_down} no longer do; {summary.crossing_criteria} have a criterion that gains or loses full "
+        "marks, or is in another band"
+    )
+    stages = create_table("cause", "meaning", "regrades", right=("regrades",))
+    for stage, count in summary.stages.items():
+        stages.add_row(STAGE_LABELS[stage], STAGE_MEANINGS[stage], str(count))
+    return [share_line, boundary_line, *([stages] if summary.stages else [])]
 
 
 def build_rank_table(ranks: RankTable) -> RenderableType:
@@ -118,4 +141,8 @@ def _format_criterion_change(change: CriterionChange) -> str:
     old_marks, new_marks = (
         format_marks(*worth) if worth is not None else "none" for worth in (change.before, change.after)
     )
-    return f"{change.title}: {old_marks} to {new_marks}{' (adjusted by staff)' if change.by_hand else ''}"
+    notes = [
+        *(["adjusted by staff"] if change.by_hand else []),
+        *(["crosses a boundary"] if change.crosses else []),
+    ]
+    return f"{change.title}: {old_marks} to {new_marks}" + (f" ({', '.join(notes)})" if notes else "")

@@ -47,7 +47,7 @@ class OverrideLine:
 
     def compute_marks(self, worth: Decimal) -> tuple[Decimal, Decimal]:
         """Return the effective marks and maximum of a criterion, given its maximum ``worth``."""
-        return (_ZERO, _ZERO) if self.marks is None else (min(self.marks, worth), worth)
+        return compute_overridden_marks(self.marks, worth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,11 @@ class CriterionMarks:
     marks: Decimal
     max_marks: Decimal
     override: OverrideLine | None
+
+
+def compute_overridden_marks(marks: Decimal | None, worth: Decimal) -> tuple[Decimal, Decimal]:
+    """Return the effective marks and maximum of a criterion with overridden ``marks`` (None: excused) of ``worth``."""
+    return (_ZERO, _ZERO) if marks is None else (min(marks, worth), worth)
 
 
 def parse_marks(text: str) -> Decimal:

@@ -24,6 +24,7 @@ GRADE_BYTES = 64_000_000
 #: Minimum size limit of one recording, regardless of their number.
 MIN_RECORDING_BYTES = 256_000
 _TEXT_KEPT = 2000
+_OMISSION_NOTE = "The recording was too large to be kept whole: "
 
 _Bytes = NDArray[np.uint8]
 
@@ -56,6 +57,11 @@ def encode_within_limit(recording: Recording, size_limit: int) -> StoredRecordin
         recording = trim_recording(recording)
         data = to_bytes(recording)
     return StoredRecording(recording, data)
+
+
+def is_whole(recording: Recording) -> bool:
+    """Return whether a stored recording has all its parts."""
+    return not any(note.startswith(_OMISSION_NOTE) for note in recording.notes)
 
 
 def to_bytes(recording: Recording) -> bytes:
@@ -142,8 +148,7 @@ def _decode_column(data: _Bytes, column: Column) -> NDArray[Any]:
 
 
 def _add_note(recording: Recording, omission: str) -> Recording:
-    note = f"The recording was too large to be kept whole: {omission}."
-    return replace(recording, notes=(*recording.notes, note))
+    return replace(recording, notes=(*recording.notes, f"{_OMISSION_NOTE}{omission}."))
 
 
 def _drop_floods(recording: Recording) -> Recording:

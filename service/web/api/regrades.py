@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from decimal import Decimal
+from typing import Annotated, Any, Literal
 
 from fastapi import Depends, Query, Request
 from fastapi.concurrency import run_in_threadpool
@@ -10,9 +11,10 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from service.grading.pass_mark import PASS_SHARE
 from service.operations import regrades as operations
 from service.operations.exports import ExportRequest, download
-from service.operations.types import JobState, Role, Standing
+from service.operations.types import ChangeStage, JobState, Role, Standing
 from service.reports.formats import FORMATS
 from service.web.access import RowName
 from service.web.api.shapes import Shape, build_example_config
@@ -33,6 +35,8 @@ _CSV_BODY = {"requestBody": {"required": True, "content": {"text/csv": {"schema"
 FormatName = Annotated[
     str, Query(alias="format", max_length=40, description=f"One of {', '.join(sorted(FORMATS))}.", examples=["csv"])
 ]
+PassMark = Annotated[int, Query(alias="pass", ge=0, le=100, description="Pass mark, in per cent of all marks.")]
+DEFAULT_PASS_MARK = int(PASS_SHARE * 100)
 PublishedOnly = Annotated[bool, Query(description="Export only published grades.")]
 
 
@@ -73,6 +77,10 @@ class CriterionChangeShape(Shape):
     before: tuple[float, float] | None
     after: tuple[float, float] | None
     by_hand: bool = Field(description="Whether staff adjustments replace the new marks.")
+    stages: list[ChangeStage] = Field(
+        description="What changed the marks. With several stages, the stored data does not tell them apart."
+    )
+    crosses: bool = Field(description="Whether full marks are gained or lost, or another band is reached.")
 
 
 class ChangeShape(Shape):
@@ -90,6 +98,13 @@ class ChangeShape(Shape):
     differs: bool
     criteria: list[CriterionChangeShape]
     reason: str
+    stages: list[ChangeStage] = Field(description="The stages of all criteria.")
+    changed_parts: list[str] = Field(
+        description="Parts of the assignment that differ, such as `world` or `scenarios`, if they changed marks."
+    )
+    crosses: Literal["up", "down"] | None = Field(
+        description="Whether the marks are now at or above the pass mark (`up`), or below it (`down`)."
+    )
 
     model_config = build_example_config(
         student="ada",
@@ -102,8 +117,53 @@ class ChangeShape(Shape):
         before_max=12,
         after_max=12,
         differs=True,
-        criteria=[{"title": "Names the shapes", "before": [4, 6], "after": [6, 6], "by_hand": False}],
-        reason="assignment changed",
+        criteria=[
+            {
+                "title": "Names the shapes",
+                "before": [4, 6],
+                "after": [6, 6],
+                "by_hand": False,
+                "stages": ["criteria"],
+                "crosses": True,
+            }
+        ],
+        reason="criteria changed",
+        stages=["criteria"],
+        changed_parts=[],
+        crosses=None,
+    )
+
+
+class ChangesSummaryShape(Shape):
+    """Numbers of regrades: by change of marks, by stage, and by boundary that they cross.
+
+    A regrade with several stages counts for each of them.
+    """
+
+    regrades: int
+    higher: int
+    lower: int
+    same: int
+    first_grades: int = Field(description="Submissions that could not be graded before.")
+    ungraded: int = Field(description="Regrades without a grade: not finished, failed or cancelled.")
+    stages: dict[ChangeStage, int]
+    crossing_up: int = Field(description="Regrades with marks that are now at or above the pass mark.")
+    crossing_down: int = Field(description="Regrades with marks that are now below the pass mark.")
+    crossing_criteria: int = Field(
+        description="Regrades with a criterion that gains or loses full marks, or reaches another band."
+    )
+
+    model_config = build_example_config(
+        regrades=20,
+        higher=6,
+        lower=1,
+        same=13,
+        first_grades=0,
+        ungraded=0,
+        stages={"criteria": 7},
+        crossing_up=1,
+        crossing_down=0,
+        crossing_criteria=7,
     )
 
 
@@ -142,15 +202,31 @@ def regrade(access: MarkAccess, context: Context, batch_id: RowName, body: Regra
 
 @router.get("/courses/{course_id}/batches/{batch_id}/changes")
 def changes(
-    access: ReadAccess, context: Context, batch_id: RowName, limit: Limit = 50, after: After = ""
+    access: ReadAccess,
+    context: Context,
+    batch_id: RowName,
+    limit: Limit = 50,
+    after: After = "",
+    pass_mark: PassMark = DEFAULT_PASS_MARK,
 ) -> Listed[ChangeShape]:
     """List the changes of a batch of regrades, by student; empty for other batches."""
     sort_key = decode_cursor(after, str)
-    all_changes = operations.list_changes(context.service, access.actor, access.course_id, batch_id)
+    pass_share = Decimal(pass_mark) / 100
+    all_changes = operations.list_changes(context.service, access.actor, access.course_id, batch_id, pass_share)
     job_ids = [each.job_id for each in all_changes]
     start = 0 if sort_key is None else job_ids.index(sort_key[0]) + 1 if sort_key[0] in job_ids else len(job_ids)
     page = build_list_page(all_changes[start : start + limit + 1], limit, lambda each: [each.job_id])
     return Listed(items=[ChangeShape.model_validate(each) for each in page.items], next=page.next)
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/changes/summary")
+def summarise_changes(
+    access: ReadAccess, context: Context, batch_id: RowName, pass_mark: PassMark = DEFAULT_PASS_MARK
+) -> ChangesSummaryShape:
+    """Return the numbers of changes of a batch of regrades; zeros for other batches."""
+    pass_share = Decimal(pass_mark) / 100
+    summary = operations.show_changes_summary(context.service, access.actor, access.course_id, batch_id, pass_share)
+    return ChangesSummaryShape.model_validate(summary)
 
 
 @router.post("/courses/{course_id}/batches/{batch_id}/publish")

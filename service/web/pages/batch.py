@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.grading.class_statistics import PASS_SHARE
+from service.grading.pass_mark import PASS_SHARE
 from service.language import translatable
 from service.operations import batch_views as views
 from service.operations import batches as operations
@@ -152,10 +152,13 @@ def show_changes(
     context: Context,
     batch_id: RowName,
     number: Annotated[int, Query(alias="page", ge=1, le=10_000)] = 1,
+    at_least: Annotated[int, Query(alias="pass", ge=0, le=100)] = int(PASS_SHARE * 100),
 ) -> Response:
-    """Show the changes by a regrade, with reasons."""
+    """Show the changes by a regrade: a summary, then each change with the stages that caused it."""
     _, page_context = _load_batch(access, context, batch_id)
-    changes_page = views.show_changes_page(context.service, access.actor, access.course_id, batch_id, number)
+    changes_page = views.show_changes_page(
+        context.service, access.actor, access.course_id, batch_id, number, Decimal(at_least) / 100
+    )
     return render_page(
         request,
         access.reader,
@@ -163,6 +166,11 @@ def show_changes(
         **page_context,
         changes_page=changes_page,
         changes=changes_page.changes,
+        summary=changes_page.summary,
+        at_least=at_least,
+        stage_labels=regrade_operations.STAGE_LABELS,
+        stage_meanings=regrade_operations.STAGE_MEANINGS,
+        part_labels=regrade_operations.PART_LABELS,
     )
 
 

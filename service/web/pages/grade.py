@@ -38,6 +38,8 @@ def show_grade(
         path=f"/courses/{access.course_id}/grades/{job_id}",
         report=view.report,
         change=view.change,
+        stage_labels=regrades.STAGE_LABELS,
+        part_labels=regrades.PART_LABELS,
         gradings=view.gradings,
         attempts=view.attempts,
         history=newest_first,

@@ -172,7 +172,8 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     (changed / "assignment.toml").write_text(text.replace("marks = 4", "marks = 6"))
     regraded = robomark(home, "batch", "regrade", batch, "-a", changed, "--wait")
     assert regraded.status == 0, regraded
-    assert re.search(r"^=1/2 🤖 +10 / 10 +12 / 12 .*: 4 / 4 to 6 / 6 +assignment changed", regraded.out, re.MULTILINE)
+    assert re.search(r"^=1/2 🤖 +10 / 10 +12 / 12 .*: 4 / 4 to 6 / 6 +criteria changed", regraded.out, re.MULTILINE)
+    assert "share of marks: 0 higher, 1 lower, 1 the same" in regraded.out
     again = re.search(r"batch (\w{12}): 2 queued for regrading", regraded.out)
     assert again is not None
 

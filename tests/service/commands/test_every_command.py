@@ -54,7 +54,7 @@ ALL = dict(_all())
 #: For each command with output, a line that runs here, and the keys of its document except "schema".
 SHOWING = {
     "batch list": "batches",
-    "batch status BATCH": "batch pace jobs changes ranks unpublished_regrades statistics history",
+    "batch status BATCH": "batch pace jobs changes changes_summary ranks unpublished_regrades statistics history",
     "batch submit new -a echo-responder": "batch queued known refusals",
     "batch similar BATCH": "assignments",
     "batch pause BATCH": "batch changed waiting running",

@@ -14,10 +14,10 @@ import acting
 import report_builders
 from builders import echo, grading_request, prepared
 from service.commands.batch.batch_summary import describe_unjudged
-from service.grading.grade import Grade
+from service.grading.grade import CriterionResult, Grade
 from service.operations.regrades import PublicationCounts
 from service.store import audit
-from service.store.batches import batches, job_lines, publishing, regrades
+from service.store.batches import batches, changes, job_lines, publishing, regrade_changes
 from service.store.batches.intake import accept_batch, accept_new_submissions
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES
 from service.store.engine import Store
@@ -29,7 +29,12 @@ from service.store.tables.submissions import Batch, Job
 from sim.errors import UsageError
 
 GRADE = report_builders.faulty_grade()
-CHANGED = replace(echo(), title="Changed", version="changed")
+#: A version with another table for the first criterion of the grade.
+CHANGED = replace(
+    echo(),
+    version="changed",
+    criteria=(*echo().criteria, echo().criteria[0].model_copy(update={"id": GRADE.criteria[0].id})),
+)
 
 
 def _better(grade: Grade) -> Grade:
@@ -63,9 +68,9 @@ def _standing(store: Store, batch: str) -> dict[str, str]:
         return {line.student: line.id for line in job_lines.load_job_lines(session, batch)}
 
 
-def _changes(store: Store, batch: str) -> list[regrades.Change]:
+def _changes(store: Store, batch: str) -> list[changes.Change]:
     with store.reading() as session:
-        return regrades.load_changes(session, batch, NO_HIDDEN_NAMES)
+        return regrade_changes.load_changes(session, batch, NO_HIDDEN_NAMES)
 
 
 def test_old_grades_stand_until_the_new_ones_are_published(store: Store) -> None:
@@ -169,9 +174,9 @@ def test_of_several_regrades_the_newest_stands(store: Store) -> None:
 @pytest.mark.parametrize(
     ("changed", "grade", "other_grader", "reason", "criteria"),
     [
-        (True, _better, False, "assignment changed", 1),
-        (False, _better, True, "grader changed", 1),
-        (True, _better, True, "assignment changed, grader changed", 1),
+        (True, _better, False, "criteria changed", 1),
+        (False, _better, True, "judging changed", 1),
+        (True, _better, True, "criteria changed, judging changed", 1),
         (False, lambda grade: grade, False, "nothing changed", 0),
         (False, _other_run, False, "unexplained", 0),
     ],
@@ -195,6 +200,21 @@ def test_what_changes_is_explained(
         assert change.differs
 
 
+@pytest.mark.parametrize(("pass_share", "crosses"), [("0.9", "up"), ("0", None), ("1", "up")])
+def test_a_change_across_the_pass_mark_is_named(store: Store, pass_share: str, crosses: str | None) -> None:
+    batch = _batch(store, "ada")
+    _grade_all(store)
+    again = _regrade(store, batch, replace(GRADE, criteria=tuple(map(_with_full_marks, GRADE.criteria))))
+    with store.reading() as session:
+        (change,) = regrade_changes.load_changes(session, again, NO_HIDDEN_NAMES, Decimal(pass_share))
+    assert change.crosses == crosses
+    assert all(criterion.crosses for criterion in change.criteria)
+
+
+def _with_full_marks(result: CriterionResult) -> CriterionResult:
+    return replace(result, marks=result.max_marks)
+
+
 def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> None:
     """SQLite stores marks as text, and "8" is not "8.0"."""
     batch = _batch(store, "ada", "bob", "cyd")
@@ -207,7 +227,7 @@ def test_equal_marks_are_equal_however_many_decimals_they_have(store: Store) -> 
                 row.marks = Decimal(before if row.regrade_of is None else after)
                 row.max_marks = Decimal("10" if row.regrade_of is None else "10.00")
     with store.reading() as session:
-        page = regrades.load_changes_page(session, again, 1, NO_HIDDEN_NAMES)
+        page = regrade_changes.load_changes_page(session, again, 1, NO_HIDDEN_NAMES)
     assert page.differing == 1
     assert [(change.student, change.differs) for change in page.changes] == [
         ("bob", True), ("ada", False), ("cyd", False),

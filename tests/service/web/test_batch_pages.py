@@ -397,6 +397,20 @@ def test_a_batch_and_one_of_it_are_graded_again_and_stand_when_published(web: We
     assert submit(grace, f"{HOME}/grades/{second}/regrade", {"assignment": "stay-inside"}).status_code == 422
 
 
+def test_the_page_of_changes_begins_with_a_summary_of_causes_and_boundaries(web: Web, grace: TestClient) -> None:
+    made = a_batch(web, "ada", "bob")
+    changes = submit(grace, f"{HOME}/batches/{made.id}/regrade").headers["location"]
+    grade = report_builders.faulty_grade()
+    grade_all(web, replace(grade, criteria=tuple(replace(each, marks=each.max_marks) for each in grade.criteria)))
+    text = words(grace.get(f"{changes}?pass=100").text)
+    assert re.search("Higher share of marks 2 Lower share of marks 0 Same share of marks 0 Now passed 2", text), text
+    assert "unexplained Assignment and release are the same." in text
+    assert text.count("boundary crossed") == 2
+    german = words(grace.get(changes, headers={"accept-language": "de"}).text)
+    assert "ungeklärt" in german
+    assert "unexplained" not in german
+
+
 def test_a_grade_is_shown_to_staff_with_its_neighbours(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "ada", "bob", "cid")
     ids = {job.student: job.job_id for job in made.jobs}

@@ -19,7 +19,7 @@ from builders import echo, grading_request, prepared
 from naming import is_named
 from service.operations import privacy, sign_in_links
 from service.operations.context import create_machine_actor
-from service.store.batches import intake, regrades
+from service.store.batches import intake, regrade_changes
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.hidden_names import HiddenNames, load_hidden_names
@@ -85,7 +85,7 @@ def test_changes_of_a_regrade_are_in_the_order_of_the_shown_names(web: Web, grac
 
 def test_the_page_of_changes_is_in_the_order_of_random_ids(web: Web, grace: Member, regrade: str) -> None:
     with web.store.reading() as session:
-        hidden_names = regrades.load_changes_page(session, regrade, 1, load_hidden_names(web.store, 1))
+        hidden_names = regrade_changes.load_changes_page(session, regrade, 1, load_hidden_names(web.store, 1))
     assert [each.job_id for each in hidden_names.changes] == sorted(each.job_id for each in hidden_names.changes)
     text = web.browser(grace).get(f"/courses/1/batches/{regrade}/changes").text
     assert [who for who in STUDENTS if re.search(rf"\b{who}\b", text, re.IGNORECASE)] == []
