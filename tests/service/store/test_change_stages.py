@@ -134,9 +134,18 @@ def test_the_difference_between_versions_names_what_affects_marks(
 def _change(before: int | None, after: int | None, *stages: ChangeStage, crosses: bool = False) -> Change:
     state = JobState.QUEUED if after is None else JobState.DONE
     criterion = CriterionChange("It works", BEFORE, AFTER, False, stages, crosses)
-    marks = [None if each is None else Decimal(each) for each in (before, after)]
     return Change(
-        *("ada", "new", "old", state, Standing.PROPOSED, *marks, Decimal(10), Decimal(10), (criterion,), ""),
+        student="ada",
+        job_id="new",
+        before_id="old",
+        state=state,
+        standing=Standing.PROPOSED,
+        before=None if before is None else Decimal(before),
+        after=None if after is None else Decimal(after),
+        before_max=Decimal(10),
+        after_max=Decimal(10),
+        criteria=(criterion,),
+        reason="",
         stages=stages,
         crosses="up" if (before, after) == (3, 5) else None,
     )

@@ -32,6 +32,7 @@ from service.store.queue import jobs
 from service.store.states import ChangeStage
 from sim import drive
 from sim.recording import Pose
+from sim.trigonometry import round_half_up
 from submissions.assignment.definition import Assignment
 from submissions.criteria.ending import EndPose
 from submissions.seeds import Secret
@@ -122,8 +123,12 @@ def _patch_simulator(patch: Patch, _: Path) -> None:
 
 def _patch_simulator_a_little(patch: Patch, _: Path) -> None:
     """Change the recordings, but no marks."""
-    compute = drive.round_half_up
-    patch.setattr(drive, "round_half_up", lambda number: compute(number) + 0.001)
+    patch.setattr(drive, "round_half_up", lambda number: round_half_up(number) + 0.001)
+
+
+def _patch_judge_and_simulator(patch: Patch, folder: Path) -> None:
+    _patch_judge(patch, folder)
+    _patch_simulator_a_little(patch, folder)
 
 
 def _patch_kit(patch: Patch, folder: Path) -> None:
@@ -161,7 +166,7 @@ FURTHER = {
     "judge and boundary changed": Plant((ChangeStage.CRITERIA,), _edit_criteria(tolerance=1000.0), lambda *_: None),
     "judge changed, simulator without effect": Plant(
         (ChangeStage.JUDGING,),
-        patch=lambda patch, path: (_patch_judge(patch, path), _patch_simulator_a_little(patch, path))[1],
+        patch=_patch_judge_and_simulator,
     ),
     "boundary raised, simulator without effect": Plant(
         (ChangeStage.CRITERIA,), _edit_criteria(tolerance=3.0), _patch_simulator_a_little
