@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import importlib
 import io
 import os
@@ -79,6 +80,37 @@ def test_a_session_of_the_students_own_has_one_thread(runner: TrialRunner) -> No
     recording = run_program(runner, ASK_ONCE, responder=text, files=files, preamble="none")
     assert recording.verdict is Verdict.FINISHED, recording.faults
     assert recording.messages[-1].text == "(1, 6)"
+
+
+#: An ONNX file whose only operator is RandomNormalLike, without a seed: input x, output y, each of shape (1, 4).
+RANDOM_OPERATOR = base64.b64decode(
+    "CAgSAXg6RwoYCgF4EgF5IhBSYW5kb21Ob3JtYWxMaWtlEgFnWhMKAXgSDgoMCAESCAoCCAEKAggEYhMKAXkSDgoMCAESCAoCCAEKAggEQgQKABAR"
+)
+USES_RANDOM_OPERATOR = f"""
+import base64, numpy, onnxruntime
+session = onnxruntime.InferenceSession(base64.b64decode({base64.b64encode(RANDOM_OPERATOR)}))
+def draw(): return str(session.run(None, {{"x": numpy.ones((1, 4), "f4")}})[0].tolist())
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "responder"),
+    [
+        (f"{USES_RANDOM_OPERATOR}print(draw())", None),
+        (ASK_ONCE, f"{USES_RANDOM_OPERATOR}def responder(_): return draw()"),
+    ],
+    ids=["robot program", "responder"],
+)
+def test_random_operators_of_a_network_give_the_same_numbers_in_every_run(
+    program: str, responder: str | None, runner: TrialRunner
+) -> None:
+    first, second, other = (
+        run_program(runner, program, responder=responder, preamble="none", seed=seed) for seed in (1, 1, 2)
+    )
+    numbers, *others = ([*each.printed, *each.messages][-1].text for each in (first, second, other))
+    assert numbers.startswith("[["), first.faults
+    assert (others[0] == numbers, others[1] == numbers) == (True, False)
+    assert first.sha256 == second.sha256
 
 
 @pytest.mark.parametrize("file", ["digits.tflite", "digits-quantized.tflite"])

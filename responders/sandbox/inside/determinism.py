@@ -15,6 +15,8 @@ import sys
 import time
 import uuid
 from collections.abc import Callable
+from importlib.machinery import ModuleSpec, PathFinder
+from types import ModuleType
 from typing import Any
 
 SECOND = 3_000_000  # units of a third of a microsecond
@@ -108,7 +110,7 @@ def _seed(self: random.Random, a: Any = None, version: int = 2) -> None:
 
 
 def install_randomness(seed: int) -> None:
-    """Seed ``random`` and numpy, and replace all system sources of randomness by draws from ``seed``."""
+    """Seed ``random``, numpy and onnxruntime, and replace all system sources of randomness by draws from ``seed``."""
     draw_count = 0
 
     def urandom(size: int) -> bytes:
@@ -127,3 +129,35 @@ def install_randomness(seed: int) -> None:
     numpy_random = sys.modules.get("numpy.random")
     if numpy_random is not None:
         numpy_random.seed(seed % 2**32)
+    _seed_onnxruntime(seed % 2**63)
+
+
+def _seed_onnxruntime(seed: int) -> None:
+    """Seed the random operators of ONNX, such as Dropout in training mode. Otherwise they start from the real time."""
+    onnxruntime = sys.modules.get("onnxruntime")
+    if onnxruntime is not None:
+        onnxruntime.set_seed(seed)
+        return
+    _SeedingFinder.seed = seed
+    if _SeedingFinder not in sys.meta_path:
+        sys.meta_path.insert(sys.meta_path.index(PathFinder), _SeedingFinder)
+
+
+class _SeedingFinder:
+    """Finds onnxruntime, and seeds it after its import."""
+
+    seed = 0
+
+    @classmethod
+    def find_spec(cls, fullname: str, path: Any, target: ModuleType | None = None) -> ModuleSpec | None:
+        specification = PathFinder.find_spec(fullname, path, target) if fullname == "onnxruntime" else None
+        if specification is not None:
+            loader: Any = specification.loader
+            execute = loader.exec_module
+
+            def execute_and_seed(module: Any) -> None:
+                execute(module)
+                module.set_seed(cls.seed)
+
+            loader.exec_module = execute_and_seed
+        return specification
