@@ -9,7 +9,7 @@ import base64
 import math
 import sys
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from enum import Enum
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 T = TypeVar("T")
+Decoder = Callable[[Any], Any]
 Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]
 
 
@@ -71,25 +72,13 @@ def decode(kind: type[T], value: Json) -> T:
 
     Unknown fields are ignored, missing ones get their defaults. Raises TypeError or ValueError for a mismatch.
     """
-    return cast(T, _decode_value(kind, value))
+    return cast(T, _build_decoder(cast(Any, kind))(value))
 
 
 def decode_arguments(kind: type, value: Mapping[str, Any]) -> dict[str, Any]:
     """Return decoded arguments for the dataclass ``kind`` from the fields present; the caller adds the others."""
-    field_types = _load_type_hints(kind)
-    return {name: _decode_value(field_types[name], item) for name, item in value.items() if name in field_types}
-
-
-@cache
-def _load_type_hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind, include_extras=True)
-
-
-@cache
-def _build_adapter(kind: Any) -> TypeAdapter[Any]:
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(kind)
+    decoders = _build_field_decoders(kind)
+    return {name: decoders[name](item) for name, item in value.items() if name in decoders}
 
 
 def _is_model(kind: Any) -> bool:
@@ -101,46 +90,79 @@ def _is_model(kind: Any) -> bool:
     return pydantic is not None and isinstance(kind, type) and issubclass(kind, pydantic.BaseModel)
 
 
-def _decode_value(kind: Any, value: Any) -> Any:
+@cache
+def _build_adapter(kind: Any) -> TypeAdapter[Any]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
+
+
+@cache
+def _build_decoder(kind: Any) -> Decoder:
+    """Return the decoder of a type, built once: a recording may have a hundred thousand messages.
+
+    Building it raises no errors and imports nothing, because a value may lack a field that is difficult to decode.
+    """
     origin = get_origin(kind)
     if origin is Annotated or _is_model(kind):
-        return _build_adapter(kind).validate_python(value)
+        return lambda value: _build_adapter(kind).validate_python(value)
     if origin is Union or origin is types.UnionType:
-        return _decode_union(get_args(kind), value)
+        return _build_union_decoder(get_args(kind))
     if origin is Literal:
-        return value
+        return _return_value
     if origin is tuple:
-        return _decode_tuple(get_args(kind), value)
+        return _build_tuple_decoder(get_args(kind))
     if origin is not None and issubclass(origin, Mapping):
-        return {key: _decode_value(get_args(kind)[1], item) for key, item in value.items()}
+        decode_item = _build_decoder(get_args(kind)[1])
+        return lambda value: {key: decode_item(item) for key, item in value.items()}
     if is_dataclass(kind):
-        field_types = _load_type_hints(cast(type, kind))
-        return cast(type, kind)(
-            **{name: _decode_value(field_types[name], item) for name, item in value.items() if name in field_types}
-        )
-    return _decode_scalar(kind, value)
+        data_class: Any = kind
+        return lambda value: data_class(**decode_arguments(data_class, value))
+    return _build_scalar_decoder(kind)
 
 
-def _decode_union(kinds: tuple[Any, ...], value: Any) -> Any:
-    if value is None and type(None) in kinds:
-        return None
+@cache
+def _build_field_decoders(kind: type) -> dict[str, Decoder]:
+    """Return the decoders of a dataclass's fields. Needed only with a value, because a type may contain itself."""
+    return {name: _build_decoder(hint) for name, hint in get_type_hints(kind, include_extras=True).items()}
+
+
+def _return_value(value: Any) -> Any:
+    return value
+
+
+def _build_union_decoder(kinds: tuple[Any, ...]) -> Decoder:
     value_kinds = [kind for kind in kinds if kind is not type(None)]
-    if len(value_kinds) != 1:
-        raise TypeError(f"cannot tell which of {value_kinds} is meant")
-    return _decode_value(value_kinds[0], value)
+    is_optional = len(value_kinds) < len(kinds)
+    decode_value = _build_decoder(value_kinds[0]) if len(value_kinds) == 1 else None
+
+    def decode_union(value: Any) -> Any:
+        if value is None and is_optional:
+            return None
+        if decode_value is None:
+            raise TypeError(f"cannot tell which of {value_kinds} is meant")
+        return decode_value(value)
+
+    return decode_union
 
 
-def _decode_tuple(kinds: tuple[Any, ...], value: Sequence[Any]) -> tuple[Any, ...]:
+def _build_tuple_decoder(kinds: tuple[Any, ...]) -> Decoder:
     if len(kinds) == 2 and kinds[1] is Ellipsis:
-        return tuple(_decode_value(kinds[0], item) for item in value)
-    return tuple(_decode_value(kind, item) for kind, item in zip(kinds, value, strict=True))
+        decode_item = _build_decoder(kinds[0])
+        return lambda value: tuple(map(decode_item, value))
+    decoders = [_build_decoder(kind) for kind in kinds]
+    return lambda value: tuple(decode(item) for decode, item in zip(decoders, value, strict=True))
 
 
-def _decode_scalar(kind: Any, value: Any) -> Any:
+def _build_scalar_decoder(kind: Any) -> Decoder:
     if kind is bytes:
-        return base64.b64decode(value, validate=True)
+        return lambda value: base64.b64decode(value, validate=True)
     if kind in (float, Decimal) or (isinstance(kind, type) and issubclass(kind, Enum)):
-        return kind(value)
-    if isinstance(value, kind):
-        return value
-    raise TypeError(f"expected {kind.__name__}, got {type(value).__name__}")
+        return cast(Decoder, kind)
+
+    def check_kind(value: Any) -> Any:
+        if isinstance(value, kind):
+            return value
+        raise TypeError(f"expected {kind.__name__}, got {type(value).__name__}")
+
+    return check_kind

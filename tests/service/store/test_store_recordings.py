@@ -6,12 +6,14 @@ import pickle
 import zlib
 from dataclasses import fields, replace
 from math import inf, nan
+from typing import Any, get_origin
 
 import numpy as np
 import pytest
 
 import report_builders
 from service.grading.grade import Grade
+from service.store import codec
 from service.store.courses.assignment_versions import assignment_from_bytes, assignment_to_bytes
 from service.store.grades.recording_texts import RecordingError, texts_from_bytes
 from service.store.grades.recordings import encode_within_limit, from_bytes, to_bytes
@@ -75,6 +77,27 @@ def test_odd_values_come_back_as_they_were() -> None:
         messages=(Message(0.1, "robot", "PY::\n\"'", None), Message(0.2, "responder", "", 0.3, 0, "lost")),
     )
     _assert_same(odd_recording, from_bytes(to_bytes(odd_recording)))
+
+
+def test_types_are_read_once_however_many_messages_a_recording_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    def count_reads(messages: int) -> int:
+        data = to_bytes(
+            replace(
+                report_builders.line_follower_recording(), messages=(Message(0.5, "robot", "PY::1", 0.6),) * messages
+            )
+        )
+        reads = 0
+
+        def read_origin(kind: Any) -> Any:
+            nonlocal reads
+            reads += 1
+            return get_origin(kind)
+
+        monkeypatch.setattr(codec, "get_origin", read_origin)
+        assert len(texts_from_bytes(data).messages) == messages
+        return reads
+
+    assert count_reads(1000) <= count_reads(1) + 50
 
 
 def test_a_recording_without_ticks_comes_back() -> None:
