@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: Maximum of the default of ``all_cpu``. It is less than the real time of a job, by default 900 s: a job that takes
+#: longer counts as a fault of the machine, is repeated, and gets no marks.
+_MAX_TOTAL_CPU = 600.0
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Limits for each child process of a trial (CPU seconds, MB, bytes of output), and for all trials together.
 
-    The default of ``all_cpu`` allows ten trials at their limits and one second for each trial.
+    The default of ``all_cpu`` allows ten trials at their limits and one second for each trial, up to ten minutes.
     """
 
     program_cpu: float = 5.0
@@ -26,7 +30,9 @@ class Limits:
 
     def compute_total_cpu(self, trials: int) -> float:
         """Return the CPU seconds for ``trials`` trials together."""
-        return self.all_cpu if self.all_cpu is not None else 10 * (self.program_cpu + self.responder_cpu) + trials
+        if self.all_cpu is not None:
+            return self.all_cpu
+        return min(10 * (self.program_cpu + self.responder_cpu) + trials, _MAX_TOTAL_CPU)
 
 
 DEFAULT_LIMITS = Limits()

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import select, update
 
 from acting import Notices, machine, service_on
-from builders import grading_request
+from builders import grading_request, settings_in
 from pools import ASSIGNMENT, LUCKY, pool_assignment, pool_request
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
@@ -31,6 +31,7 @@ from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
+from submissions.assignment.limits import Limits
 from submissions.grading_request import GradingRequest
 
 
@@ -158,6 +159,13 @@ def test_completion_lowers_published_marks_only_if_the_course_says_so(
     refusal = "exact already" if is_replaced else "your published marks stay"
     with store.transaction() as session, pytest.raises(UsageError, match=refusal):
         pool_progress.expedite(session, accepted.submission_id, now_standing.enrolment_id, now(session))
+
+
+@pytest.mark.parametrize("limits", [Limits(), Limits(program_cpu=120, responder_cpu=120)])
+def test_the_processor_time_of_the_largest_assignment_fits_into_the_time_of_a_job(
+    tmp_path: Path, limits: Limits
+) -> None:
+    assert limits.compute_total_cpu(5000) * 1.4 < settings_in(tmp_path).job_seconds
 
 
 def test_a_student_has_all_trials_run_once_at_a_time(
