@@ -21,18 +21,21 @@ from service.store.tables.grades import CriterionResultRow
 from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
+#: Estimates that students see. Exact ones would tell them in how many hidden trials a program computed for long.
+_STUDENTS_SECONDS = (60, 300, 1800)
+
 
 @dataclass(frozen=True, slots=True)
 class PoolProgress:
     """Whether the marks of a grade are exact, and otherwise the completion that makes them exact.
 
-    ``seconds`` is the estimated CPU time of all trials. ``is_expedited`` says whether somebody waits for it.
+    ``seconds`` is an upper estimate of the CPU time of all trials. ``is_expedited`` says whether somebody waits for it.
     ``can_decrease`` says whether lower exact marks would replace these.
     """
 
     is_exact: bool
     is_expedited: bool = False
-    seconds: float = 0.0
+    seconds: int = 0
     can_decrease: bool = False
 
 
@@ -56,7 +59,9 @@ def load_progress(session: Session, submission_id: int) -> PoolProgress | None:
     completion = _find_completion(session, job.id)
     is_expedited = completion is not None and completion.lane is JobQueue.INTERACTIVE
     can_decrease = job.published_at is None or is_always_replaced(session, job)
-    return PoolProgress(False, is_expedited, _estimate_seconds(job, pools), can_decrease)
+    seconds = _estimate_seconds(job, pools)
+    shown_seconds = next((each for each in _STUDENTS_SECONDS if seconds <= each), 3600)
+    return PoolProgress(False, is_expedited, shown_seconds, can_decrease)
 
 
 def estimate_completion_seconds(session: Session, provisional_jobs: Sequence[Job]) -> float:

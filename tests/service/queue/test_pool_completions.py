@@ -180,7 +180,7 @@ def test_a_student_has_all_trials_run_once_at_a_time(
     ada = Actor("ada", person_id=person_id, roles={1: Role.STUDENT})
     before = appeals.show_own(service, ada, 1, first.submission_id).pool
     assert before is not None
-    assert (before.is_exact, before.is_expedited, before.seconds > 0) == (False, False, True)
+    assert (before.is_exact, before.is_expedited, before.seconds) == (False, False, 60)
     appeals.run_all_trials(service, ada, 1, first.submission_id)
     assert notices.sent == [("interactive", 1)]
     with pytest.raises(UsageError, match="wait for the result"):
@@ -194,6 +194,22 @@ def test_a_student_has_all_trials_run_once_at_a_time(
     assert after.is_exact
     with pytest.raises(UsageError, match="exact already"):
         appeals.run_all_trials(service, ada, 1, first.submission_id)
+
+
+def test_a_student_learns_no_exact_processor_time_of_hidden_trials(
+    store: Store, service_settings: Settings, runner: TrialRunner, assignment: Assignment
+) -> None:
+    accepted = submitted(store, pool_request(assignment))
+    graded(store, service_settings, runner)
+    estimates = set()
+    for seconds in (0.1, 0.9, 1.7):
+        with store.transaction() as session:
+            job = session.get_one(Job, accepted.job_id)
+            job.cost = {**job.cost, "spent": {"cpu_seconds": seconds}} if job.cost else None
+            progress = pool_progress.load_progress(session, accepted.submission_id)
+            assert progress is not None
+            estimates.add(progress.seconds)
+    assert estimates == {60}
 
 
 def test_a_copy_of_a_provisional_grade_is_completed_too(
