@@ -13,13 +13,13 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Column, Engine, Table, bindparam, delete, func, insert, select, update
+from sqlalchemy import Column, Engine, Table, bindparam, delete, func, insert, select, text, update
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import OperationalError
 
 from service.store.engine import open_engine
 from service.store.migrate import upgrade_database
-from service.store.revision import find_newest_revision, load_current_revision
+from service.store.revision import find_newest_revision, load_current_revision, load_schema_state
 from service.store.tables import METADATA
 from service.store.tables.courses import Course
 from service.store.tables.installation import Installation, SchemaCompatibility
@@ -78,10 +78,28 @@ def restore(file: Path, target: Engine) -> None:
                 f"{file}: cannot be read ({error}), expected a file that robomark db backup made"
             ) from None
         with _open_file(snapshot) as source:
+            _check_objects(source, file)
             if load_current_revision(source) is None:
                 raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
             upgrade_database(source)
+            _check_usability(source, file)
             _copy_rows(source, target)
+
+
+def _check_objects(source: Engine, file: Path) -> None:
+    """Raise UsageError for views and triggers. A view instead of a table could have endless rows."""
+    with source.connect() as connection:
+        other_kind = connection.scalar(text("SELECT type FROM sqlite_master WHERE type NOT IN ('table', 'index')"))
+    if other_kind is not None:
+        raise UsageError(f"{file}: has a {other_kind}, {_EXPECTED}")
+
+
+def _check_usability(source: Engine, file: Path) -> None:
+    """Raise UsageError if a database with these rows would be unusable."""
+    with source.connect() as connection:
+        installations = connection.scalar(select(func.count()).select_from(Installation))
+    if installations != 1 or not load_schema_state(source).is_usable:
+        raise UsageError(f"{file}: is damaged, {_EXPECTED}")
 
 
 @contextmanager

@@ -141,6 +141,30 @@ def test_a_backup_of_a_newer_release_is_refused_and_leaves_nothing(tmp_path: Pat
             restore(copy, store.engine)
 
 
+@pytest.mark.parametrize(
+    ("statement", "words"),
+    [
+        (
+            "CREATE VIEW endless AS WITH RECURSIVE t(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM t) SELECT x FROM t",
+            "view",
+        ),
+        ("CREATE TRIGGER later AFTER INSERT ON course BEGIN DELETE FROM job; END", "trigger"),
+        ("DELETE FROM installation", "is damaged"),
+        ("UPDATE schema_compatibility SET oldest_compatible = '9999'", "is damaged"),
+    ],
+)
+def test_a_changed_backup_is_refused(statement: str, words: str, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.db"
+    with open_store(settings_in(tmp_path / "home")) as store:
+        back_up(store.engine, copy)
+        engine = open_engine(f"sqlite:///{copy}")
+        with engine.begin() as connection:
+            connection.exec_driver_sql(statement)
+        engine.dispose()
+        with pytest.raises(UsageError, match=f"copy.db: .*{words}.*expected a file that robomark db backup made"):
+            restore(copy, store.engine)
+
+
 def _counts(store: Store) -> dict[str, int]:
     with store.reading() as session:
         counts = {kind: session.scalar(select(func.count()).select_from(kind)) or 0 for kind in _COUNTED}
