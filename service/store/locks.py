@@ -1,13 +1,15 @@
 """Row locks. Several rows are locked in the order of their ids, so that transactions do not deadlock.
 
-They are ``FOR NO KEY UPDATE``, so PostgreSQL can check foreign keys to the locked rows. SQLite allows one writer at a
-time and ignores them.
+They are ``FOR NO KEY UPDATE``, so PostgreSQL can check foreign keys to the locked rows, except before a deletion.
+SQLite allows one writer at a time and ignores them.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 from sqlalchemy import ColumnElement, Select, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from service.store.tables.courses import Course
 from service.store.tables.installation import Installation
@@ -43,6 +45,11 @@ def lock_submissions(session: Session, *conditions: ColumnElement[bool]) -> None
     """
     query = select(SubmissionRow.id).where(*conditions).order_by(SubmissionRow.id)
     session.execute(query.with_for_update(key_share=True)).all()
+
+
+def lock_for_deletion(session: Session, key: InstrumentedAttribute[Any], condition: ColumnElement[bool]) -> None:
+    """Lock the rows that match the condition. Until the end of the transaction, no row that refers to them is added."""
+    session.execute(select(key).where(condition).order_by(key).with_for_update()).all()
 
 
 def match_and_lock_jobs(*conditions: ColumnElement[bool]) -> ColumnElement[bool]:

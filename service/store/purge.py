@@ -10,12 +10,12 @@ from collections.abc import Set
 from dataclasses import dataclass
 from datetime import datetime
 
-from sqlalchemy import Column, Integer, MetaData, Table, and_, delete, func, insert, or_, select, update
+from sqlalchemy import Column, Integer, MetaData, Select, Table, and_, delete, func, insert, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.store import audit
 from service.store.engine import Store, now, retry_conflicts
-from service.store.locks import lock_jobs, lock_submissions
+from service.store.locks import lock_for_deletion, lock_jobs, lock_submissions
 from service.store.statement_log import erase_entries
 from service.store.states import UNFINISHED, JobState, Role
 from service.store.tables.courses import AssignmentVersion, Extension, OpenAssignment
@@ -57,6 +57,15 @@ def purge_submissions(
     with store.transaction() as session:
         _TEMPORARY.create_all(session.connection())
         _mark_old_submissions(session, cutoff, course_id)
+        if not only_count:
+            # Others may have added or claimed jobs meanwhile. From now on, they wait.
+            lock_for_deletion(session, SubmissionRow.id, SubmissionRow.id.in_(_marked_submission_ids))
+            lock_for_deletion(session, Job.id, Job.submission_id.in_(_marked_submission_ids))
+        _unmark_needed_submissions(session)
+        _mark_leaving_enrolments(session)
+        if not only_count:
+            lock_for_deletion(session, Enrolment.id, Enrolment.id.in_(_marked_enrolment_ids))
+            session.execute(delete(_MARKED_ENROLMENTS).where(_MARKED_ENROLMENTS.c.id.in_(_select_keeping_enrolments())))
         counts = _count_marked_rows(session)
         if counts.submissions and not only_count:
             _delete_marked(session)
@@ -149,14 +158,23 @@ def _delete_replies(session: Session, course_id: int) -> None:
 
 
 def _mark_old_submissions(session: Session, cutoff: datetime, course_id: int | None) -> None:
-    unfinished_ids = select(Job.submission_id).where(Job.state.in_(UNFINISHED))
     old_submissions = select(SubmissionRow.id).where(
-        SubmissionRow.created_at < cutoff, SubmissionRow.id.not_in(unfinished_ids)
+        SubmissionRow.created_at < cutoff, SubmissionRow.id.not_in(_select_unfinished_submissions())
     )
     if course_id is not None:
         course_enrolments = select(Enrolment.id).where(Enrolment.course_id == course_id)
         old_submissions = old_submissions.where(SubmissionRow.enrolment_id.in_(course_enrolments))
     session.execute(insert(_MARKED_SUBMISSIONS).from_select(["id"], old_submissions))
+
+
+def _select_unfinished_submissions() -> Select[int]:
+    return select(Job.submission_id).where(Job.state.in_(UNFINISHED))
+
+
+def _unmark_needed_submissions(session: Session) -> None:
+    """Keep submissions with an unfinished job, and the sources of grades that are kept."""
+    is_unfinished = _MARKED_SUBMISSIONS.c.id.in_(_select_unfinished_submissions())
+    session.execute(delete(_MARKED_SUBMISSIONS).where(is_unfinished))
     source = aliased(Job)
     needed_ids = (
         select(source.submission_id)
@@ -166,13 +184,20 @@ def _mark_old_submissions(session: Session, cutoff: datetime, course_id: int | N
     # The source of a kept copy may be a copy itself.
     while session.execute(delete(_MARKED_SUBMISSIONS).where(_MARKED_SUBMISSIONS.c.id.in_(needed_ids))).rowcount:  # type: ignore[attr-defined]
         pass
+
+
+def _mark_leaving_enrolments(session: Session) -> None:
     losing_enrolments = (
         select(SubmissionRow.enrolment_id)
         .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .where(SubmissionRow.id.in_(_marked_submission_ids), Enrolment.role == Role.STUDENT)
     )
-    keeping_enrolments = select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_marked_submission_ids))
-    session.execute(insert(_MARKED_ENROLMENTS).from_select(["id"], losing_enrolments.except_(keeping_enrolments)))
+    leaving_enrolments = losing_enrolments.except_(_select_keeping_enrolments())
+    session.execute(insert(_MARKED_ENROLMENTS).from_select(["id"], leaving_enrolments))
+
+
+def _select_keeping_enrolments() -> Select[int]:
+    return select(SubmissionRow.enrolment_id).where(SubmissionRow.id.not_in(_marked_submission_ids))
 
 
 def _delete_marked(session: Session) -> None:

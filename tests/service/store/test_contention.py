@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import random
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from decimal import Decimal
 from typing import Any
 
@@ -28,11 +29,12 @@ from service.store.batches import intake
 from service.store.batches.intake import accept_batch
 from service.store.courses import policies
 from service.store.courses.policies import PolicyLimits
-from service.store.engine import Store, is_conflict, retry_conflicts
+from service.store.engine import Store, is_conflict, now, retry_conflicts
 from service.store.grades import appeals, overrides
 from service.store.people import lti
 from service.store.people.lti import Registration
-from service.store.queue import jobs, lease_reaper, self_tests, test_runs
+from service.store.purge import PurgeCounts, purge_submissions
+from service.store.queue import jobs, lease_reaper, pool_completions, self_tests, test_runs
 from service.store.queue.jobs import RetryPolicy
 from service.store.states import JobQueue, JobState, Standing
 from service.store.tables.base import Base
@@ -80,6 +82,26 @@ def _lose_leases(store: Store, chance: random.Random) -> None:
     jobs.claim_job(store, f"silent-{chance.randrange(3)}", -1)
     lease_reaper.requeue_lost_jobs(store, RetryPolicy(0.0))
     lease_reaper.mark_notified(store, JobQueue.BATCH, 10)
+
+
+def test_a_purge_keeps_submissions_that_are_regraded_meanwhile(store: Store) -> None:
+    kept, removed = accept_one(store), accept_one(store, "bob")
+    for _ in range(2):
+        _finish_next(store, "worker")
+    later = datetime.now(UTC) + timedelta(days=1)
+    with ThreadPoolExecutor(1) as pool:
+        with store.transaction() as session:
+            original = session.get_one(Job, kept.job_id)
+            regrade = pool_completions.build_completion(original)
+            jobs.enqueue(session, regrade, now(session))
+            session.flush()
+            purge = pool.submit(purge_submissions, store, later, "staff")
+            # On PostgreSQL it marks what it sees, and waits for this transaction; on SQLite it has not begun.
+            time.sleep(0.5)
+        assert purge.result() == PurgeCounts(1, 1, 1)
+    with store.reading() as session:
+        assert set(session.scalars(select(Job.submission_id))) == {kept.submission_id}
+    assert removed.submission_id != kept.submission_id
 
 
 def test_staff_workers_and_the_lease_reaper_at_once(store: Store) -> None:
