@@ -97,6 +97,7 @@ def sign_out(service: Service, actor: Actor, enrolment_id: int, *, release: bool
     return ended_count
 
 
+@retry_conflicts
 def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
     """Merge the persons of two enrolments in different courses, and sign both out.
 
@@ -109,6 +110,12 @@ def join(service: Service, actor: Actor, request: JoinRequest) -> Member:
         person_id, other_person = row.person_id, other.person_id
         if person_id == other_person:
             raise Conflict("these two accounts already belong to one person")
+        members = [
+            each for which in (person_id, other_person) for _, each in membership.load_enrolments(session, which)
+        ]
+        # A launch by one of them into a course of the other waits, or has enrolled them before the next statement.
+        for course_id in sorted({each.course_id for each in members}):
+            lock_course(session, course_id)
         lock_persons(session, person_id, other_person)
         own_courses, other_courses = (
             {each.enrolment_id: name for name, each in membership.load_enrolments(session, which)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import cast
 
@@ -17,10 +18,12 @@ from service.operations.people import JoinRequest, TokenForRequest
 from service.queue.notifier import Notifier
 from service.settings import Settings
 from service.store import audit
-from service.store.engine import Store
+from service.store.engine import Store, now
+from service.store.locks import lock_course
 from service.store.people import credentials, membership
 from service.store.people.credentials import MAX_TOKENS
 from service.store.people.membership import Member
+from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.tables.people import Enrolment, Person
 from submissions.student_identity import Student
@@ -54,6 +57,21 @@ def test_two_persons_become_one_who_signs_in_anew(service: Service) -> None:
         assert [credentials.identify(session, each, CredentialKind.SESSION) for each in secrets] == [None, None]
         (entry,) = audit.load_entries(session, "person", str(one.person_id))
     assert (entry.action, entry.actor, entry.detail["joined"]) == ("join", "root", two.person_id)
+
+
+def test_persons_are_not_joined_if_one_enters_a_course_of_the_other_meanwhile(service: Service) -> None:
+    one, two = instructor(service, "one"), instructor(service, "two")
+    with ThreadPoolExecutor(1) as pool:
+        with service.store.transaction() as session:
+            lock_course(session, two.course_id)
+            enrolment_id = Students(session, two.course_id).enrol(Student("grace2"), now(session))
+            session.get_one(Enrolment, enrolment_id).person_id = one.person_id
+            session.flush()
+            joined = pool.submit(operations.join, service, ROOT, JoinRequest(one.enrolment_id, two.enrolment_id))
+            # On PostgreSQL it waits for this transaction; on SQLite it has not begun.
+            time.sleep(0.5)
+        with pytest.raises(Conflict, match="both accounts are in the course"):
+            joined.result()
 
 
 def test_nobody_but_an_operator_joins_and_signs_out(service: Service) -> None:
