@@ -88,7 +88,7 @@ RANDOM_OPERATOR = base64.b64decode(
 )
 USES_RANDOM_OPERATOR = f"""
 import base64, numpy, onnxruntime
-session = onnxruntime.InferenceSession(base64.b64decode({base64.b64encode(RANDOM_OPERATOR)}))
+session = onnxruntime.InferenceSession(base64.b64decode({base64.b64encode(RANDOM_OPERATOR)!r}))
 def draw(): return str(session.run(None, {{"x": numpy.ones((1, 4), "f4")}})[0].tolist())
 """
 
