@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from service.grading.grade import Grade, TrialResult
@@ -70,7 +71,8 @@ def _describe_first(file: StatementFile, number: int, trial: TrialResult) -> str
 def _find_marks_differences(file: StatementFile, grade: Grade) -> Iterator[str]:
     """Yield the criteria whose marks differ, without those that staff set."""
     criteria = {result.id: result for result in grade.criteria}
-    for stated in collect_values(file, FactKind.CRITERION).values():
+    stated_criteria = (collect_values(file, kind).values() for kind in (FactKind.CRITERION, FactKind.HIDDEN_CRITERION))
+    for stated in itertools.chain.from_iterable(stated_criteria):
         result = criteria.get(stated.get("id"))
         if stated.get("set_by_staff") or result is None:
             continue

@@ -19,7 +19,7 @@ from service.operations.lookup import (
     require_own_submission,
 )
 from service.statements.envelopes import Envelope
-from service.statements.facts import FactKind, OpenFact, open_fact
+from service.statements.facts import FactKind
 from service.statements.keys import PublicKey
 from service.statements.keys_document import KeyLine
 from service.statements.merkle_tree import build_inclusion_proof, compute_root
@@ -28,10 +28,9 @@ from service.statements.statement_file import LogPlace, StatementFile
 from service.statements.tick_columns import encode_columns
 from service.store import audit, statement_log
 from service.store.batches import stored_requests
-from service.store.courses import policies
 from service.store.engine import now, retry_conflicts
 from service.store.grades import results
-from service.store.grades.statements import GradeFacts, load_facts
+from service.store.grades.statements import GradeFacts, load_facts, load_marks_facts
 from service.store.installation import load_secret
 from service.store.states import Role
 from service.store.tables.courses import AssignmentVersion, Course
@@ -66,14 +65,12 @@ def show_own_statement(service: Service, actor: Actor, course_id: int, submissio
     with service.store.reading() as session:
         row = require_own_submission(session, actor, course_id, submission_id)
         entry, envelope = _require_entry(session, row.id)
-        visibilities = policies.load_visibilities(session, str(entry.job_id))
-        grade_facts = load_facts(session, [str(entry.job_id)])[str(entry.job_id)]
-        facts = _select_student_facts(grade_facts, visibilities)
+        grade_facts = load_marks_facts(session, [str(entry.job_id)])[str(entry.job_id)]
         leaves = statement_log.load_leaves(session)
-        opened_facts = _open_facts(facts, entry)
+        facts = grade_facts.open_facts(bytes.fromhex(entry.opening_key or ""), *_list_student_kinds(grade_facts))
         name = f"statement-{row.assignment}-{row.attempt}.json"
     place = _build_place(service, entry, leaves)
-    return StatementDownload(StatementFile(envelope, _load_public_keys(service), place, opened_facts).to_bytes(), name)
+    return StatementDownload(StatementFile(envelope, _load_public_keys(service), place, facts).to_bytes(), name)
 
 
 def show_statement(service: Service, actor: Actor, course_id: int, job_id: str) -> StatementDownload:
@@ -92,9 +89,9 @@ def show_statement(service: Service, actor: Actor, course_id: int, job_id: str) 
             raise NotFound("There is no such page or item, or you have no access to it.")
         entry, envelope = _require_entry(session, submission.id)
         stated_job = session.get_one(Job, entry.job_id)
-        facts = load_facts(session, [stated_job.id])[stated_job.id].list_facts()
+        grade_facts = load_facts(session, [stated_job.id])[stated_job.id]
+        facts = grade_facts.open_facts(bytes.fromhex(entry.opening_key or ""), *FactKind)
         leaves = statement_log.load_leaves(session)
-        opened_facts = _open_facts(facts, entry)
         assignment = stored_requests.load_assignment(session, stated_job.id)
         grade = results.load_original_grade(session, stated_job.id)
         has_secret = stated_job.secret_sha256 == secret.sha256
@@ -104,7 +101,7 @@ def show_statement(service: Service, actor: Actor, course_id: int, job_id: str) 
         envelope,
         _load_public_keys(service),
         place,
-        opened_facts,
+        facts,
         assignment.build_seed_table(secret) if has_secret else None,
         columns,
     )
@@ -214,20 +211,7 @@ def sign_head(service: Service, leaves: Sequence[bytes]) -> Envelope:
     return _sign(service, PredicateType.LOG_HEAD, subjects={"log": root}, predicate={"size": len(leaves)})
 
 
-def _select_student_facts(grade_facts: GradeFacts, visibilities: frozenset[str]) -> list[Any]:
-    """Return the criteria that a student sees, and the total if these are all.
-
-    Students get no facts on trials: all students share their seeds.
-    """
-    numbers = {number for number, each in enumerate(grade_facts.visibilities, 1) if each in visibilities}
-    sees_all = len(numbers) == len(grade_facts.visibilities)
-    return [
-        fact
-        for fact in grade_facts.list_facts()
-        if (fact.kind is FactKind.TOTAL and sees_all) or (fact.kind is FactKind.CRITERION and fact.number in numbers)
-    ]
-
-
-def _open_facts(facts: Sequence[Any], entry: StatementEntry) -> tuple[OpenFact, ...]:
-    opening_key = bytes.fromhex(entry.opening_key or "")
-    return tuple(open_fact(fact, opening_key) for fact in facts)
+def _list_student_kinds(grade_facts: GradeFacts) -> tuple[FactKind, ...]:
+    """Return the kinds of facts that students see. The total would tell the marks of hidden criteria."""
+    has_hidden_criteria = bool(grade_facts.values[FactKind.HIDDEN_CRITERION])
+    return (FactKind.CRITERION,) if has_hidden_criteria else (FactKind.TOTAL, FactKind.CRITERION)

@@ -1,6 +1,7 @@
 """Facts of a grade, to which its statement commits without saying them: total, criteria, trials.
 
-A reader gets the facts that this reader may see, each with its salt, and can check them against the commitments.
+A reader gets the facts that this reader may see, each with its salt, and can check them against the commitments. Those
+that only staff see have one commitment together, which does not tell how many they are.
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
-import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -23,11 +23,16 @@ _encode = json.JSONEncoder(ensure_ascii=True, separators=(",", ":"), sort_keys=T
 
 
 class FactKind(StrEnum):
-    """Kinds of facts; criteria and trials are numbered from 1, the total is number 1."""
+    """Kinds of facts. Facts of each kind are numbered from 1."""
 
     TOTAL = "total"
     CRITERION = "criterion"
+    HIDDEN_CRITERION = "hidden criterion"
     TRIAL = "trial"
+
+
+#: Kinds whose facts only staff see.
+SEALED_KINDS = frozenset({FactKind.HIDDEN_CRITERION, FactKind.TRIAL})
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +73,15 @@ def open_fact(fact: Fact, opening_key: bytes) -> OpenFact:
     return OpenFact(fact, salt.hex()[:_SALT_DIGITS])
 
 
-def commit_to_facts(facts: Sequence[Fact], opening_key: bytes, *, hidden_trials: int) -> dict[str, Any]:
-    """Return the commitments of a statement, by kind.
-
-    ``hidden_trials`` is the number of trials of pools that were not run. Random commitments stand for them, so that
-    the number of commitments does not tell how many trials were needed.
-    """
+def commit_to_facts(facts: Sequence[OpenFact]) -> dict[str, Any]:
+    """Return the commitments of a statement by kind: a list, or for kinds that only staff see one hash of it."""
     commitments: dict[str, list[str]] = {kind.value: [] for kind in FactKind}
-    for fact in facts:
-        commitments[fact.kind.value].append(open_fact(fact, opening_key).commitment)
-    commitments[FactKind.TRIAL.value] += [secrets.token_hex(32) for _ in range(hidden_trials)]
-    return commitments
+    for each in sorted(facts, key=lambda each: each.fact.number):
+        commitments[each.fact.kind.value].append(each.commitment)
+    return {
+        kind: hashlib.sha256(_encode(listed).encode("ascii")).hexdigest() if kind in SEALED_KINDS else listed
+        for kind, listed in commitments.items()
+    }
 
 
 def parse_open_fact(value: Any) -> OpenFact:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
 from service.statements.envelopes import Envelope
-from service.statements.facts import FactKind
+from service.statements.facts import SEALED_KINDS, FactKind, OpenFact, commit_to_facts
 from service.statements.keys import PublicKey
 from service.statements.merkle_tree import is_included
 from service.statements.statement import PredicateType, Statement, parse_statement
@@ -103,24 +103,36 @@ def _is_in_log(envelope: Envelope, place: LogPlace, number: Any, size: Any, root
 
 
 def _check_facts(file: StatementFile, statement: Statement) -> Iterator[Check]:
-    commitments = statement.predicate.get("commitments")
-    for each in file.facts:
-        kind, number = each.fact.kind.value, each.fact.number
-        listed = commitments.get(kind) if isinstance(commitments, dict) else None
-        if not isinstance(listed, list) or not 0 < number <= len(listed) or listed[number - 1] != each.commitment:
-            yield Check(False, f"{kind} {number} is not what was signed")
+    stated = statement.predicate.get("commitments")
+    commitments = stated if isinstance(stated, dict) else {}
+    own_commitments = commit_to_facts(file.facts)
+    for kind in FactKind:
+        facts = [each for each in file.facts if each.fact.kind is kind]
+        listed = commitments.get(kind.value)
+        is_stated = own_commitments[kind.value] == listed if kind in SEALED_KINDS else _are_listed(facts, listed)
+        if facts and not is_stated:
+            yield Check(False, f"the {kind.value} facts are not what was signed")
             return
     yield Check(True, f"{len(file.facts)} facts are those that were signed")
     yield from _check_total(file, commitments)
 
 
+def _are_listed(facts: Sequence[OpenFact], listed: Any) -> bool:
+    """Return whether the commitment to each fact is at its place in the list."""
+    return isinstance(listed, list) and all(
+        each.fact.number > 0 and listed[each.fact.number - 1 :][:1] == [each.commitment] for each in facts
+    )
+
+
 def _check_total(file: StatementFile, commitments: Any) -> Iterator[Check]:
     """Compare the total with the sum of the criteria, if the reader has all of them."""
     total, criteria = collect_values(file, FactKind.TOTAL).get(1), collect_values(file, FactKind.CRITERION)
-    if total is None or len(criteria) != len(commitments.get(FactKind.CRITERION.value, ())):
+    hidden = collect_values(file, FactKind.HIDDEN_CRITERION)
+    listed = commitments.get(FactKind.CRITERION.value)
+    if total is None or not isinstance(listed, list) or len(criteria) != len(listed):
         return
     try:
-        marks = sum((Decimal(each["marks"]) for each in criteria.values()), Decimal(0))
+        marks = sum((Decimal(each["marks"]) for each in (*criteria.values(), *hidden.values())), Decimal(0))
         is_sum = marks == Decimal(total["marks"])
     except (KeyError, TypeError, ValueError, InvalidOperation):
         is_sum = False

@@ -96,8 +96,11 @@ def erase_entries(session: Session, submission_ids: Select[int]) -> None:
     erased_entries = [(number, leaf) for number, leaf in session.execute(query)]
     if not erased_entries:
         return
-    empty_values = dict.fromkeys(("submission_id", "job_id", "salt", "opening_key", "key_id", "signature", "payload"))
-    statement = update(StatementEntry).where(is_erased).values(**empty_values)
+    statement = (
+        update(StatementEntry)
+        .where(is_erased)
+        .values(submission_id=None, job_id=None, salt=None, opening_key=None, key_id=None, signature=None, payload=None)
+    )
     session.execute(statement.execution_options(synchronize_session=False))
     append_entries(
         session,

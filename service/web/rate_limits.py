@@ -65,6 +65,8 @@ class RateLimits:
     exports: RateLimit = field(default_factory=lambda: RateLimit(burst=3, per_minute=0.1))
     #: Downloads of the files of an own submission, by person. Readers that are slow keep them in memory.
     files: RateLimit = field(default_factory=lambda: RateLimit(burst=20, per_minute=6))
+    #: Receipts and statements, by person. The place of a statement in the log is computed for each.
+    statements: RateLimit = field(default_factory=lambda: RateLimit(burst=20, per_minute=6))
     #: API calls, by token. The settings define the limit.
     api_calls: RateLimit = field(default_factory=lambda: RateLimit(burst=600, per_minute=600))
     #: Pages and their images, by person. The limit is the same as for API calls.

@@ -13,7 +13,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.statements.envelopes import Envelope
-from service.statements.facts import FactKind, open_fact
+from service.statements.facts import FactKind, OpenFact, commit_to_facts
 from service.statements.keys_document import KeyLine
 from service.statements.log_head import FiledHead
 from service.statements.merkle_tree import compute_root
@@ -26,6 +26,7 @@ from service.store.tables.submissions import Job
 from sim.errors import UsageError
 
 _CHUNK_SIZE = 500
+_MARKS_KINDS = (FactKind.TOTAL, FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +150,7 @@ def _summarise(predicate: Mapping[str, Any]) -> dict[str, Any]:
         "change": predicate.get("change"),
         "issued_at": predicate.get("issued_at"),
         "erased": tuple(each for each in erased if type(each) is int) if isinstance(erased, list) else (),
-        "commitments": {kind: listed.get(kind) for kind in (FactKind.TOTAL, FactKind.CRITERION)},
+        "commitments": {kind: listed.get(kind) for kind in _MARKS_KINDS},
     }
 
 
@@ -255,12 +256,18 @@ def _check_grades(session: Session, entries: Sequence[_Entry], findings: _Findin
 def _compare_marks(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:
     for job_id, facts in load_marks_facts(session, entries_by_job).items():
         entry = entries_by_job[job_id]
-        for fact in facts.list_facts():
-            listed = entry.commitments.get(fact.kind)
-            stated = listed[fact.number - 1 :][:1] if isinstance(listed, list) else []
-            if stated != [open_fact(fact, entry.opening_key).commitment]:
-                what = "total" if fact.kind is FactKind.TOTAL else f"criterion {fact.value['id']}"
-                findings.name_grade(
-                    entry.number, job_id, f"was changed: its {what} is not that of entry {entry.number}"
-                )
-                break
+        opened_facts = facts.open_facts(entry.opening_key, *_MARKS_KINDS)
+        actual, stated = commit_to_facts(opened_facts), entry.commitments
+        changed = [kind for kind in _MARKS_KINDS if actual[kind.value] != stated.get(kind)]
+        if changed:
+            what = _name_difference(opened_facts, changed[0], stated.get(changed[0]))
+            findings.name_grade(entry.number, job_id, f"was changed: its {what} is not that of entry {entry.number}")
+
+
+def _name_difference(facts: Sequence[OpenFact], kind: FactKind, stated: Any) -> str:
+    """Return the name of the first fact of a kind whose commitment is not the stated one."""
+    listed = stated if isinstance(stated, list) else []
+    for each in facts:
+        if kind is FactKind.CRITERION is each.fact.kind and listed[each.fact.number - 1 :][:1] != [each.commitment]:
+            return f"criterion {each.fact.value['id']}"
+    return kind.value

@@ -13,7 +13,7 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.statements.facts import OPENING_KEY_BYTES, Fact, FactKind, commit_to_facts
+from service.statements.facts import OPENING_KEY_BYTES, Fact, FactKind, OpenFact, commit_to_facts, open_fact
 from service.statements.statement import Change, format_moment, name_entries
 from service.store.grades import overrides
 from service.store.statement_log import Draft, append_entries, load_newest_entry
@@ -28,19 +28,17 @@ _CHUNK_SIZE = 200
 
 @dataclass(slots=True)
 class GradeFacts:
-    """The facts of a stored grade as it counts, and the number of its pools' trials that were not run."""
+    """The values of the facts of a stored grade as it counts, by kind."""
 
-    total: Any
-    criteria: list[Any] = field(default_factory=list)
-    visibilities: list[str] = field(default_factory=list)  # of the criteria
-    trials: list[Any] = field(default_factory=list)
-    trial_visibilities: list[str] = field(default_factory=list)
-    hidden_trials: int = 0
+    values: dict[FactKind, list[Any]] = field(default_factory=lambda: {kind: [] for kind in FactKind})
 
-    def list_facts(self) -> list[Fact]:
-        """Return all facts, the total first."""
-        values = ((FactKind.TOTAL, [self.total]), (FactKind.CRITERION, self.criteria), (FactKind.TRIAL, self.trials))
-        return [Fact(kind, number, value) for kind, each in values for number, value in enumerate(each, 1)]
+    def open_facts(self, opening_key: bytes, *kinds: FactKind) -> tuple[OpenFact, ...]:
+        """Return the facts of these kinds with their salts."""
+        return tuple(
+            open_fact(Fact(kind, number, value), opening_key)
+            for kind in kinds
+            for number, value in enumerate(self.values[kind], 1)
+        )
 
 
 def state_publication(session: Session, job_ids: Collection[str]) -> None:
@@ -84,34 +82,32 @@ def load_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFac
     """Return the facts of grades by job, read in four statements."""
     facts_by_job = load_marks_facts(session, job_ids)
     trial = TrialRow
-    trial_columns = (trial.job_id, trial.scenario, trial.scenario_index, trial.seed, trial.sha256, trial.visibility)
-    trials_query = select(*trial_columns).where(trial.job_id.in_(job_ids)).order_by(trial.job_id, trial.position)
-    for job_id, scenario, index, seed, recording_sha256, visibility in session.execute(trials_query):
+    columns = (trial.job_id, trial.scenario, trial.scenario_index, trial.seed, trial.sha256)
+    query = select(*columns).where(trial.job_id.in_(job_ids)).order_by(trial.job_id, trial.position)
+    for job_id, scenario, index, seed, recording_sha256 in session.execute(query):
         value = {"scenario": scenario, "index": index, "seed": seed, "recording_sha256": recording_sha256}
-        facts_by_job[job_id].trials.append(value)
-        facts_by_job[job_id].trial_visibilities.append(visibility)
+        facts_by_job[job_id].values[FactKind.TRIAL].append(value)
     return facts_by_job
 
 
 def load_marks_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFacts]:
     """Return the facts of grades by job, without those on trials."""
-    facts_by_job = {
-        job.id: GradeFacts(_describe_total(job.marks, job.max_marks, job.provisional))
-        for job in session.execute(select(Job.id, Job.marks, Job.max_marks, Job.provisional).where(Job.id.in_(job_ids)))
-    }
+    facts_by_job = {}
+    totals_query = select(Job.id, Job.marks, Job.max_marks, Job.provisional).where(Job.id.in_(job_ids))
+    for job_id, marks, max_marks, provisional in session.execute(totals_query):
+        facts_by_job[job_id] = GradeFacts()
+        total = {"marks": _format(marks), "max_marks": _format(max_marks), "provisional": provisional}
+        facts_by_job[job_id].values[FactKind.TOTAL].append(total)
     overrides_by_job = overrides.load_overrides(session, job_ids)
     row = CriterionResultRow
-    columns = (row.job_id, row.criterion, row.title, row.marks, row.max_marks, row.visibility, row.pool)
+    columns = (row.job_id, row.criterion, row.title, row.marks, row.max_marks, row.visibility)
     query = select(*columns).where(row.job_id.in_(job_ids)).order_by(row.job_id, row.position)
-    for job_id, criterion, title, marks, worth, visibility, pool in session.execute(query):
+    for job_id, criterion, title, marks, worth, visibility in session.execute(query):
         override = overrides_by_job.get(job_id, {}).get(criterion)
         effective_marks, max_marks = (marks, worth) if override is None else override.compute_marks(worth)
-        facts = facts_by_job[job_id]
         value = {"id": criterion, "title": title, "marks": _format(effective_marks), "max_marks": _format(max_marks)}
-        facts.criteria.append({**value, "set_by_staff": override is not None})
-        facts.visibilities.append(visibility)
-        if pool is not None:
-            facts.hidden_trials = max(facts.hidden_trials, pool["size"] - pool["drawn"])
+        kind = FactKind.HIDDEN_CRITERION if visibility == "hidden" else FactKind.CRITERION
+        facts_by_job[job_id].values[kind].append({**value, "set_by_staff": override is not None})
     return facts_by_job
 
 
@@ -137,14 +133,10 @@ def _build_draft(row: Any, facts: GradeFacts) -> Draft:
         "graded_at": None if job.graded_at is None else format_moment(job.graded_at),
         "published_at": format_moment(job.published_at),
         "grader": {"version": job.grader_version, "sha256": job.grader_sha256},
-        "commitments": commit_to_facts(facts.list_facts(), opening_key, hidden_trials=facts.hidden_trials),
+        "commitments": commit_to_facts(facts.open_facts(opening_key, *FactKind)),
     }
     subjects = {"submission": submission.sha256}
     return Draft(Change.PUBLISHED, subjects, predicate, submission.id, job.id, opening_key)
-
-
-def _describe_total(marks: Any, max_marks: Any, provisional: bool) -> dict[str, Any]:
-    return {"marks": _format(marks), "max_marks": _format(max_marks), "provisional": provisional}
 
 
 def _format(marks: Any) -> str:

@@ -31,21 +31,20 @@ _OWN_PATH = "/courses/{course_id}/mine/submissions/{submission_id}"
 @router.get(_OWN_PATH + "/receipt", responses=FILE_RESPONSES, response_class=Response)
 def own_receipt(access: OwnAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the signed receipt of a submission of the token's owner."""
-    context.limits.files.spend(str(access.actor.person_id))
+    context.limits.statements.spend(str(access.actor.person_id))
     return _respond(statements.show_own_receipt(context.service, access.actor, access.course_id, submission_id))
 
 
 @router.get(_OWN_PATH + "/statement", responses=FILE_RESPONSES, response_class=Response)
 def own_statement(access: OwnAccess, context: Context, submission_id: RowNumber) -> Response:
     """Return the signed statement on a published grade of the token's owner; 409 before it is published."""
-    context.limits.files.spend(str(access.actor.person_id))
+    context.limits.statements.spend(str(access.actor.person_id))
     return _respond(statements.show_own_statement(context.service, access.actor, access.course_id, submission_id))
 
 
 @router.get("/courses/{course_id}/grades/{job_id}/statement", responses=FILE_RESPONSES, response_class=Response)
 def statement(access: StaffAccess, context: Context, job_id: RowName) -> Response:
     """Return the signed statement on a published grade with all facts and seeds; 409 before it is published."""
-    context.limits.files.spend(str(access.actor.person_id))
     return _respond(statements.show_statement(context.service, access.actor, access.course_id, job_id))
 
 

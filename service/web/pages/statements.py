@@ -31,7 +31,7 @@ def download_keys(context: Context) -> Response:
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/receipt")
 def download_own_receipt(access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Return the signed receipt of a submission."""
-    context.limits.files.spend(str(access.actor.person_id))
+    context.limits.statements.spend(str(access.actor.person_id))
     receipt = statements.show_own_receipt(context.service, access.actor, access.course_id, submission_id)
     return respond_with_attachment(receipt.data, receipt.name, "application/json")
 
@@ -39,7 +39,7 @@ def download_own_receipt(access: CourseStudent, context: Context, submission_id:
 @router.get("/courses/{course_id}/mine/submissions/{submission_id}/statement")
 def download_own_statement(access: CourseStudent, context: Context, submission_id: RowNumber) -> Response:
     """Return the signed statement on a published grade, with what the student may see."""
-    context.limits.files.spend(str(access.actor.person_id))
+    context.limits.statements.spend(str(access.actor.person_id))
     statement = statements.show_own_statement(context.service, access.actor, access.course_id, submission_id)
     return respond_with_attachment(statement.data, statement.name, "application/json")
 
@@ -47,6 +47,5 @@ def download_own_statement(access: CourseStudent, context: Context, submission_i
 @router.get("/courses/{course_id}/grades/{job_id}/statement")
 def download_statement(access: CourseInstructor, context: Context, job_id: RowName) -> Response:
     """Return the signed statement on a published grade, with all facts and seeds."""
-    context.limits.files.spend(str(access.actor.person_id))
     statement = statements.show_statement(context.service, access.actor, access.course_id, job_id)
     return respond_with_attachment(statement.data, statement.name, "application/json")

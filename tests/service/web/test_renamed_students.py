@@ -49,6 +49,7 @@ _WITHOUT_ANSWER = {
     f"{_COURSE}/people/table",
     f"{_COURSE}/people/{{enrolment_id}}/link",
     f"{API}{_COURSE}/submissions/{{submission_id}}/files",
+    *(f"{start}{_COURSE}/grades/{{job_id}}/statement" for start in ("", API)),
 }
 _FORMATS = [f"?format={name}" for name, each in FORMATS.items() if each.worksheet is None and each.archive is None]
 _SORTS = [f"?sort={way}{by}" for way in ("", "-") for by in ("student", "name", "assignment", "marks", "state")]
