@@ -88,7 +88,7 @@ def parse_open_fact(value: Any) -> OpenFact:
     """Return the fact of a JSON value. Raises UsageError if it is none."""
     try:
         kind, number, salt = FactKind(value["kind"]), value["number"], value["salt"]
-        if type(number) is int and isinstance(salt, str):
+        if type(number) is int and isinstance(salt, str) and isinstance(value["value"], dict):
             return OpenFact(Fact(kind, number, value["value"]), salt)
     except (KeyError, TypeError, ValueError):
         pass

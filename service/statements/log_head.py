@@ -59,7 +59,7 @@ def build_filed_head(envelope: Envelope, start: int, leaves: Sequence[bytes]) ->
         raise UsageError("the file contains no head of the log")
     try:
         root = bytes.fromhex(statement.subjects["log"])
-    except (KeyError, ValueError):
+    except (KeyError, TypeError, ValueError):
         raise UsageError("the head of the log names no root") from None
     if not 0 <= start <= size or len(leaves) != size - start:
         raise UsageError("the file has %(count)s leaves, expected %(size)s", count=len(leaves), size=size - start)

@@ -79,6 +79,9 @@ def parse_statement(envelope: Envelope) -> Statement:
         value = read_json(envelope.payload)
         if value["_type"] != _STATEMENT_TYPE or not isinstance(value["predicate"], dict):
             raise ValueError
+        # Anybody can sign a file with a key of their own, so its parts may have any type.
+        if not all(isinstance(value["predicate"].get(name, {}), dict) for name in ("assignment", "grader")):
+            raise ValueError
         subjects = {each["name"]: each["digest"]["sha256"] for each in value["subject"]}
         return Statement(PredicateType(value["predicateType"]), subjects, value["predicate"])
     except (JSONDecodeError, UnreadableDataError, KeyError, TypeError, ValueError):

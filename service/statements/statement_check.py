@@ -98,7 +98,7 @@ def _is_in_log(envelope: Envelope, place: LogPlace, number: Any, size: Any, root
     proof = [bytes.fromhex(each) for each in place.proof]
     try:
         return is_included(envelope.hash_as_leaf(bytes.fromhex(place.salt)), number, size, proof, bytes.fromhex(root))
-    except ValueError:
+    except (TypeError, ValueError):
         return False
 
 

@@ -146,6 +146,27 @@ def test_a_statement_with_a_wrong_part_is_refused_or_fails(name: str, value: Any
     assert name in ("public_keys", "facts") or not checked.passed
 
 
+@pytest.mark.parametrize("predicate", [{"assignment": 1}, {"grader": "x"}])
+def test_a_predicate_with_parts_of_other_types_is_refused(predicate: Any) -> None:
+    envelope = sign_statement(OTHER_KEY, PredicateType.GRADE, {}, predicate)
+    with pytest.raises(UsageError, match="no statement that Robomark knows"):
+        check_statement(StatementFile(envelope, (OTHER_KEY.public_key,)), [])
+
+
+def test_facts_and_roots_of_other_types_are_refused() -> None:
+    document = json.loads(_build_file().to_bytes())
+    document["facts"][0]["value"] = "x"
+    with pytest.raises(UsageError, match="a fact without"):
+        parse_statement_file(json.dumps(document).encode())
+    subjects: Any = {"log": 5}
+    head = sign_statement(KEY, PredicateType.LOG_HEAD, subjects, {"size": 5, "issued_at": ""})
+    with pytest.raises(UsageError, match="names no root"):
+        build_filed_head(head, 5, [])
+    file = _build_file()
+    assert file.place is not None
+    assert "not entry 2" in _find_failures(replace(file, place=replace(file.place, head=head)))[0]
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff", b"[" * 100_000, b'{"robomark_statement": 2}', b"null"])
 def test_what_is_no_statement_is_refused_with_a_sentence(content: bytes) -> None:
     with pytest.raises(UsageError):
