@@ -77,9 +77,13 @@ def main(arguments: list[str]) -> int:
         parser.error(f"there is no group {unknown[0]}; there are {', '.join(GROUPS)}")
     names = options.group or (_QUICK if options.quick else tuple(GROUPS))
     recorded_run = table.load_recorded_run()
-    measured_rows = [row for name in names for row in GROUPS[name](1 if options.quick else 5)]
-    table.print_rows(measured_rows, recorded_run)
-    table.write_rows(table.LATEST, measured_rows)
+    measured_rows: list[Measurement] = []
+    try:
+        for name in names:
+            measured_rows += GROUPS[name](1 if options.quick else 5)
+    finally:  # a group that fails does not cost the others their rows
+        table.print_rows(measured_rows, recorded_run)
+        table.write_rows(table.LATEST, measured_rows)
     if options.record:
         table.write_rows(table.RECORDED, measured_rows)
     return int(any(row.gates for row in measured_rows))
