@@ -1,5 +1,6 @@
-"""A database as after years of use: 100,000 grades of 2000 students, all copies of one graded job.
+"""A database as after years of use: 100,000 grades, which are copies of one graded job.
 
+2000 students made two attempts at each of 25 assignments, each in a batch.
 The database generates the rows itself, which takes seconds. ``rows.py`` runs the queries.
 """
 
@@ -17,12 +18,14 @@ from service.store.columns import UtcDateTime
 from service.store.engine import Store
 from service.store.states import JobState
 from service.store.tables.base import Base
+from service.store.tables.courses import AssignmentVersion
 from service.store.tables.grades import CriterionResultRow, TrialRow
 from service.store.tables.people import Enrolment, Person
 from service.store.tables.submissions import Batch, Job, SubmissionRow
 
 STUDENTS = 2000
 BATCHES = 50
+ATTEMPTS = 2
 GRADES = STUDENTS * BATCHES
 #: Batches that no worker has started to grade.
 WAITING_BATCHES = 5
@@ -68,14 +71,24 @@ def fill(store: Store, image_of: GradedBatch) -> None:
         _copy(session, Enrolment, enrolment.id, student, enrolment_changes)
         batches = _select_numbers(BATCHES)
         _copy(session, Batch, image_of.batch, batches, {"id": _build_text("b", _WIDE + batches.c.number)})
+        versions = _select_numbers(BATCHES // ATTEMPTS)
+        version_changes = {
+            "id": _FIRST + versions.c.number,
+            "assignment": _build_text("a", _WIDE + versions.c.number),
+            "sha256": _build_text("v", versions.c.number),
+        }
+        _copy(session, AssignmentVersion, job.assignment_version_id, versions, version_changes)
         grade_number = number.c.number
+        batch_number = _divide(grade_number, STUDENTS)
+        assignment_number = _divide(batch_number, ATTEMPTS)
         parent_keys = {
             "enrolment_id": _FIRST + grade_number % STUDENTS,
-            "batch_id": _build_text("b", _WIDE + _divide(grade_number, STUDENTS)),
+            "batch_id": _build_text("b", _WIDE + batch_number),
         }
         submission_changes = {
             "id": _FIRST + grade_number,
-            "attempt": _divide(grade_number, STUDENTS) + 1,
+            "assignment": _build_text("a", _WIDE + assignment_number),
+            "attempt": batch_number % ATTEMPTS + 1,
             "sha256": _build_text("s", grade_number),
         }
         _copy(session, SubmissionRow, job.submission_id, number, parent_keys | submission_changes)
@@ -83,6 +96,7 @@ def fill(store: Store, image_of: GradedBatch) -> None:
         job_changes = {
             "id": _build_text("j", _WIDE + grade_number),
             "submission_id": _FIRST + grade_number,
+            "assignment_version_id": _FIRST + assignment_number,
             "cache_key": _build_text("c", grade_number),
         }
         moments = dict.fromkeys(("queued_at", "due_at", "started_at", "graded_at", "finished_at"), long_ago)

@@ -12,7 +12,7 @@ from datetime import datetime
 from decimal import Decimal
 
 from sqlalchemy import ColumnElement, Row, Select, case, func, select, tuple_
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from service.store.batches.batches import is_regrade, select_shown_submissions
 from service.store.courses.hidden_names import NO_HIDDEN_NAMES, HiddenNames
@@ -189,6 +189,7 @@ def _select_job_lines() -> Select[*_JobColumns]:
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, Job.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .options(*(defer(column, raiseload=True) for column in (Job.notes, Job.hints, Job.cost, Job.phases)))
     )
 
 
