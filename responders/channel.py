@@ -37,6 +37,7 @@ class Channel:
     range: float = 600.0
     facing: float = 90.0
     blocked_by: Literal["obstacles", "nothing"] = "obstacles"
+    never_lost: frozenset[int] = frozenset()  # numbers of texts that chance does not lose, nor their answers
 
 
 class TrialChannel:
@@ -52,7 +53,7 @@ class TrialChannel:
 
         The draws start at ``index``, so that each direction has its own.
         """
-        if self._chance.uniform(number, index) < self._channel.loss:
+        if number not in self._channel.never_lost and self._chance.uniform(number, index) < self._channel.loss:
             return 0
         return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 

@@ -22,7 +22,7 @@ from responders.faults import (
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.served_child import ServedChild
-from responders.trial_spec import ResponderSpec
+from responders.trial_spec import EarlierAnswer, ResponderSpec
 from sim.random_streams import RandomStream
 from sim.recording import SECOND, AgentMessage, Call, Fault, Verdict
 
@@ -82,6 +82,7 @@ class ResponderProcess:
     ) -> None:
         """Start the process. ``agents`` are the agents that it may ask."""
         self._spec = spec
+        self._earlier_answers = iter(spec.earlier_answers)
         self._agents = agents
         if agents is not None:
             self._schema = wire.RESPONDER_WITH_AGENTS
@@ -146,6 +147,11 @@ class ResponderProcess:
             logged_data: The data that the robot has logged since the last text.
             sender: The number of the robot, in a trial of two.
         """
+        answer = self._ask_child(text, t, message, logged_data, sender)
+        earlier_answer = next(self._earlier_answers, None)
+        return answer if earlier_answer is None else self._repeat_answer(earlier_answer)
+
+    def _ask_child(self, text: str, t: int, message: int, logged_data: LoggedData, sender: int | None) -> Answer:
         if self._child is None:
             return Answer()
         self._message, self._asked_at, self._slept = message, t, 0
@@ -157,6 +163,18 @@ class ResponderProcess:
             return Answer(fault=self._convert_stop(stop, t))
         except Exception as error:
             return Answer(fault=self._convert_stop(to_child_data_error(error), t))
+
+    def _repeat_answer(self, earlier_answer: EarlierAnswer) -> Answer:
+        """Return an answer from an earlier recording. Its faults are not repeated."""
+        text, slept = earlier_answer.text, earlier_answer.slept
+        if text is None or not text.startswith(message_format.JSON):
+            return Answer(text, slept)
+        try:
+            entry = message_format.format_queue_entry(text)
+        except ValueError:
+            return Answer(text, slept, note="malformed")
+        self._meter.charge_bytes(len(entry))
+        return Answer(text, slept, entry=entry)
 
     def close(self) -> None:
         """Close the child, if there is one."""

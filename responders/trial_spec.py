@@ -65,8 +65,19 @@ class ProgramSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class EarlierAnswer:
+    """An answer from an earlier recording: its text, None for no answer, and the time slept before it."""
+
+    text: str | None
+    slept: int = 0  # units of simulated time
+
+
+@dataclass(frozen=True, slots=True)
 class ResponderSpec:
-    """A responder: its code and the files in its folder. ``executed_statements`` as in ``ProgramSpec``."""
+    """A responder: its code and the files in its folder. ``executed_statements`` as in ``ProgramSpec``.
+
+    It receives every text, but its first answers are replaced by the ``earlier_answers``.
+    """
 
     code: SourceFile
     files: Mapping[str, bytes]
@@ -74,6 +85,7 @@ class ResponderSpec:
     output_bytes: int
     function: str | None = None  # name of the responder function; None lets the module choose
     executed_statements: ExecutedStatements | None = None
+    earlier_answers: tuple[EarlierAnswer, ...] = ()
 
     @property
     def role(self) -> ChildRole:
@@ -131,6 +143,7 @@ class TrialSpec:
     partner: PartnerSpec | None = None
     number: int = 1  # the robot's number, as its program sees it
     records_lines: bool = True  # whether the recording has the lines of the program, for hints
+    noise_seed: int | None = None  # seed of the noise; None: the world's
 
     def build_partner_spec(self, partner: PartnerSpec) -> TrialSpec:
         """Return the trial as the second robot sees it, with its own seeds."""
@@ -143,4 +156,5 @@ class TrialSpec:
             child_seed=RandomStream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
             partner=None,
             number=2,
+            noise_seed=None if self.noise_seed is None else RandomStream(self.noise_seed, "second robot").integer(0),
         )

@@ -29,7 +29,8 @@ def format_reading(reading: float | list[float]) -> str:
 
 def build_world(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: HashChain) -> World:
     """Return the world at the start of the trial."""
-    return World(spec.robot, arena, camera, spec.pose, spec.noise, spec.seed, chain, spec.physics, spec.tick)
+    noise_seed = spec.seed if spec.noise_seed is None else spec.noise_seed
+    return World(spec.robot, arena, camera, spec.pose, spec.noise, noise_seed, chain, spec.physics, spec.tick)
 
 
 def build_robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:

@@ -36,6 +36,10 @@ def grade(
         str | None, typer.Option(metavar="N|TAG", help="For a notebook: the number of the run to mark, or its tag.")
     ] = None,
     *,
+    causes: Annotated[
+        bool,
+        typer.Option("--causes", help="Run trials that lost marks again, with one thing exchanged, to show causes."),
+    ] = False,
     all_trials: Annotated[
         bool, typer.Option("--all-trials", help="Run all trials of pools, so that no marks are provisional.")
     ] = False,
@@ -62,5 +66,6 @@ def grade(
         language,
         run=run,
         extent=extent,
+        causes=causes,
         unsafe=unsafe,
     )

@@ -20,6 +20,7 @@ from service.commands.sandbox_warning import warn_about_missing_sandbox
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.pools.drawing import PoolExtent
+from service.grading.reruns.grade_causes import add_causes
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import load_home_secret
 from service.language import load_language
@@ -28,6 +29,8 @@ from service.reports.rows import TableRow, describe_missing_part
 from service.settings import load_settings
 from sim.errors import HostError, RobomarkError, UsageError
 from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import read_example
+from submissions.assignment.folder import REFERENCE
 from submissions.assignment.reader import find_assignment, find_in_catalogue
 from submissions.bundle import derive_student_name, read_submission
 from submissions.part_fitting import fit_parts
@@ -47,6 +50,7 @@ def grade_all(
     *,
     run: str | None,
     extent: PoolExtent,
+    causes: bool,
     unsafe: bool,
 ) -> None:
     """Grade the submissions and print the results, one by one or in one document.
@@ -60,6 +64,7 @@ def grade_all(
         language: Code of the reports' language.
         run: The run to mark, for a notebook with several runs.
         extent: How many trials of pools are run.
+        causes: Show the causes of lost marks, by running trials again.
         unsafe: Run student code without the sandbox.
 
     Raises:
@@ -88,13 +93,18 @@ def grade_all(
                     raise UsageError(name_conflicts[path])
                 submission, definition = read_with_assignment(path, named_definition)
                 submission = _select_run(submission, run)
-                grade = grade_submission(
-                    submission,
-                    _apply_to_scenarios(definition, channel_flags),
-                    secret=secret,
-                    runner=runner,
-                    extent=extent,
-                )
+                graded_definition = _apply_to_scenarios(definition, channel_flags)
+                grade = grade_submission(submission, graded_definition, secret=secret, runner=runner, extent=extent)
+                if causes:
+                    grade = add_causes(
+                        grade,
+                        submission,
+                        graded_definition,
+                        runner,
+                        reference=_read_reference(assignment or definition.id, definition),
+                        secret=secret,
+                        reveals=definition.reruns.reveals,
+                    )
                 grade = replace(grade, notes=(*_describe_channel_flags(channel_flags), *grade.notes))
             except RobomarkError as error:
                 is_rejected = isinstance(error, UsageError)
@@ -125,6 +135,17 @@ def grade_all(
     if worst_error is not None:
         error_type = UsageError if isinstance(worst_error, UsageError) else HostError
         raise error_type("some submissions could not be graded")
+
+
+def _read_reference(name_or_path: str, assignment: Assignment) -> Submission | None:
+    """Return the reference solution beside the assignment, if the assignment compares halves and has one."""
+    if not assignment.reruns.halves:
+        return None
+    try:
+        return read_example(name_or_path, REFERENCE)
+    except UsageError as error:
+        print_note(f"the reference solution cannot be used, so no parts of it are exchanged: {error}")
+        return None
 
 
 def _select_run(submission: Submission, run: str | None) -> Submission:

@@ -227,6 +227,16 @@ class TrialResult:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownCause:
+    """Why a criterion lost marks, as reruns showed it: sentences, the next step, and whether only staff see it."""
+
+    criterion: str
+    text: str
+    next_step: str
+    for_staff: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Cost:
     """The shared limits of all trials and, for staff, the resources that they used."""
 
@@ -253,6 +263,7 @@ class Grade:
     secret_sha256: str = PUBLIC_SECRET.sha256  # hash of the secret that the seeds are derived from
     cost: Cost | None = field(default=None, compare=False)  # measured, so it may differ between two runs
     comments: tuple[WrittenComment, ...] = ()
+    causes: tuple[ShownCause, ...] = field(default=(), compare=False)  # from reruns, which may not have been made yet
 
     @property
     def marks(self) -> Decimal:
@@ -312,6 +323,9 @@ def convert_texts(grade: Grade, convert: Callable[[str], str]) -> Grade:
         criteria=tuple(_convert_result(result, convert) for result in grade.criteria),
         notes=tuple(convert(note) for note in grade.notes),
         hints=tuple(convert(hint) for hint in grade.hints),
+        causes=tuple(
+            replace(each, text=convert(each.text), next_step=convert(each.next_step)) for each in grade.causes
+        ),
     )
 
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from typing import Protocol
 
 from responders.repeated_faults import REPLAY_NOTES, FaultReplay, ReplayDiverged
 from responders.sandbox.meter import JobLimits, JobMeter
-from responders.trial_spec import PartnerSpec, TrialSpec
 from service.grading.grade import Cost, Grade, TrialResult, build_unjudged_notes
 from service.grading.hints import collect_hints
 from service.grading.judging.judge_declaration import StaticAnalysis
@@ -24,18 +22,14 @@ from service.grading.pools.drawing import PoolExtent, run_rounds
 from service.grading.run_plan import RunPlan, plan_run
 from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
+from service.grading.trial_specs import build_trial_spec
 from service.language import translatable
 from service.version import GRADER_VERSION
-from sim.errors import AssignmentError
-from sim.floors import Floor, build_floor, build_floor_from_image
-from sim.motion import Physics
 from sim.random_streams import RandomStream
-from sim.recording import BROWSER_TICK, TICK, Recording
-from sim.robot import get_robot
+from sim.recording import Recording
 from sim.sentences import Sentence
-from sim.world import Noise
-from submissions.assignment.definition import Assignment, Trial, WorldSpec
-from submissions.seeds import PUBLIC_SECRET, SeedSource, compute_child_seed
+from submissions.assignment.definition import Assignment, Trial
+from submissions.seeds import PUBLIC_SECRET, SeedSource
 from submissions.submission import PART_FILES, Submission
 
 _MEGABYTE = 1 << 20
@@ -173,7 +167,7 @@ def _run_trials(
 
 def _record_trial(trial: Trial, plan: RunPlan, runner: TrialRunner, meter: JobMeter, repeats: FaultReplay) -> Recording:
     """Run one trial, without any child process that would only repeat an earlier fault."""
-    spec, obstacles, spent_before = _build_trial_spec(trial, plan), plan.assignment.world.obstacles, meter.spent
+    spec, obstacles, spent_before = build_trial_spec(trial, plan), plan.assignment.world.obstacles, meter.spent
     with runner.skipping_repeats(repeats):
         try:
             return repeats.record_trial(plan.trial.run(spec, obstacles, runner, meter))
@@ -234,50 +228,3 @@ class _ProgressReporter:
     def _report_progress(self) -> None:
         self._last = time.monotonic()
         self._observe(GradingProgress(self._done, self._trials))
-
-
-def _build_floor(world: WorldSpec, seed: int) -> Floor:
-    if world.image is not None:
-        return _load_floor_image(world.background, world.image)
-    return build_floor(world.background, labels=world.labels, seed=seed if world.sheet is None else world.sheet)
-
-
-@functools.lru_cache(maxsize=2)
-def _load_floor_image(name: str, image: bytes) -> Floor:
-    """Load the floor image once for all trials. Cameras cache images by identity."""
-    return build_floor_from_image(name, image)
-
-
-def _build_trial_spec(trial: Trial, plan: RunPlan) -> TrialSpec:
-    world = plan.assignment.world
-    if trial.scenario.visibility != "visible":
-        plan = plan.to_hidden_plan()
-    if plan.program is None:
-        raise AssignmentError(f"Assignment {plan.assignment.id} has scenarios and no robot program to run in them.")
-    return TrialSpec(
-        program=plan.program,
-        responder=plan.responder,
-        agents=plan.agents,
-        collaborative=plan.collaborative,
-        floor=_build_floor(world, trial.seed),
-        robot=get_robot(world.robot),
-        pose=trial.pose,
-        noise=Noise(trial.light_noise, trial.motor_noise, world.noise == "both directions"),
-        channel=trial.channel,
-        seconds=trial.scenario.seconds,
-        seed=trial.seed,
-        child_seed=compute_child_seed(trial.seed, plan.submission),
-        pen_down="p" in plan.flags.switches,
-        physics=Physics(world.solid, world.drive),
-        tick=BROWSER_TICK if world.tick == "browser" else TICK,
-        partner=_build_partner_spec(trial, plan),
-        records_lines=trial.scenario.visibility == "visible",
-    )
-
-
-def _build_partner_spec(trial: Trial, plan: RunPlan) -> PartnerSpec | None:
-    """Return the second robot, if there is one. A program from the assignment may run until the time limit."""
-    if plan.second_program is None or trial.second_pose is None:
-        return None
-    is_given = plan.assignment.parts.second_program in plan.assignment.given_parts
-    return PartnerSpec(plan.second_program, trial.second_pose, "p" in plan.second_flags.switches, is_given)

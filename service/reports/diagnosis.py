@@ -8,9 +8,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from decimal import Decimal
 
-from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade
+from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade, ShownCause
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_display_text, to_one_line
 from service.reports.faults import SourceLine, extract_excerpt, find_named_source, group_faults
@@ -45,7 +46,8 @@ class Excerpt:
 class Diagnosis:
     """The main explanation. ``cause`` and ``next_step`` are sentences; ``further`` are secondary causes.
 
-    ``lost`` has the indices of the criteria that lost marks by this cause.
+    ``lost`` has the indices of the criteria that lost marks by this cause. ``proof`` is what reruns showed, if there
+    were any, for ``proven``, the index of one of the criteria.
     """
 
     cause: str
@@ -53,6 +55,8 @@ class Diagnosis:
     further: tuple[str, ...] = ()
     excerpt: Excerpt | None = None
     lost: frozenset[int] = frozenset()
+    proof: str = ""
+    proven: int | None = None
 
 
 def format_excerpt(diagnosis: Diagnosis) -> list[str]:
@@ -72,8 +76,48 @@ def describe_outcome(grade: Grade, diagnosis: Diagnosis, language: Language = EN
 def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:
     """Return the main cause: a hint, else a costly fault, a missing part, or the finding of the costliest criterion.
 
-    Excerpts need the ``submission``.
+    Excerpts need the ``submission``. If reruns showed the cause, their proof is added, and its next step replaces the
+    general one.
     """
+    diagnosis = _diagnose_recorded_trials(grade, submission, language)
+    indices = {result.id: index for index, result in enumerate(grade.criteria) if result.marks < result.max_marks}
+    causes = [each for each in grade.causes if each.criterion in indices]
+    if not causes:
+        return diagnosis
+    cause = min(causes, key=lambda each: _rank_cause(grade, indices[each.criterion], diagnosis))
+    is_general = diagnosis.next_step == describe_grade(grade, language).next_step
+    return replace(
+        diagnosis,
+        next_step=format_cause_step(cause) if is_general else diagnosis.next_step,
+        proof=format_proof(cause),
+        proven=indices[cause.criterion],
+    )
+
+
+def _rank_cause(grade: Grade, index: int, diagnosis: Diagnosis) -> tuple[bool, Decimal, int]:
+    """Return a key that is smallest for the costliest criterion among those of the diagnosis, or else among all."""
+    result = grade.criteria[index]
+    return index not in diagnosis.lost, result.marks - result.max_marks, index
+
+
+def format_proof(cause: ShownCause) -> str:
+    """Return what reruns showed, in one line."""
+    return to_display_text(cause.text, 600)
+
+
+def format_cause_step(cause: ShownCause) -> str:
+    """Return the next step of a cause that reruns showed."""
+    return to_display_text(cause.next_step, 300)
+
+
+def list_further_proofs(grade: Grade, diagnosis: Diagnosis) -> dict[int, str]:
+    """Return what reruns showed for other criteria than that of the diagnosis, by index, without repetitions."""
+    indices = {result.id: index for index, result in enumerate(grade.criteria) if result.marks < result.max_marks}
+    proofs = {indices[each.criterion]: format_proof(each) for each in grade.causes if each.criterion in indices}
+    return {index: proof for index, proof in proofs.items() if index != diagnosis.proven and proof != diagnosis.proof}
+
+
+def _diagnose_recorded_trials(grade: Grade, submission: Submission | None, language: Language) -> Diagnosis:
     verdict_words = describe_grade(grade, language)
     # Staff adjustments are described in the words of the person who made them.
     automatic_criteria = {index: each for index, each in enumerate(grade.criteria) if each.set_by_hand is None}

@@ -13,7 +13,13 @@ from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Evidence, Grade, TrialResult
 from service.language import Language, translatable
-from service.reports.diagnosis import Diagnosis, describe_finding, describe_outcome, diagnose
+from service.reports.diagnosis import (
+    Diagnosis,
+    describe_finding,
+    describe_outcome,
+    diagnose,
+    list_further_proofs,
+)
 from service.reports.display_text import (
     abbreviate_message,
     format_decimal,
@@ -73,6 +79,7 @@ class CriterionLine:
     moment: str  # a link to the moment in the replay, with its text; empty if there is none
     watch: str
     for_staff: str
+    proof: str  # what reruns showed, if the diagnosis does not say it
     pool: str  # whether the marks are exact or provisional, if they are defined over a pool
 
 
@@ -176,8 +183,16 @@ def build_page(view: View, submission: Submission | None = None, replayed_trials
     trial_lines = tuple(_build_trial_line(trial, language) for trial in grade.trials[:_MAX_TRIALS])
     faults = group_faults(grade, submission, language=language)
     diagnosis = diagnose(grade, submission, language)
+    proofs = list_further_proofs(grade, diagnosis)
     criteria = tuple(
-        _build_criterion_line(grade, result, replayed_trials, language, is_in_diagnosis=index in diagnosis.lost)
+        _build_criterion_line(
+            grade,
+            result,
+            replayed_trials,
+            language,
+            proof=proofs.get(index, ""),
+            is_in_diagnosis=index in diagnosis.lost,
+        )
         for index, result in enumerate(grade.criteria)
     )
     is_time_limit_only = all(fault.verdict is Verdict.TIME_LIMIT for fault in faults)
@@ -215,7 +230,13 @@ def build_page(view: View, submission: Submission | None = None, replayed_trials
 
 
 def _build_criterion_line(
-    grade: Grade, result: CriterionResult, replayed_trials: frozenset[int], language: Language, *, is_in_diagnosis: bool
+    grade: Grade,
+    result: CriterionResult,
+    replayed_trials: frozenset[int],
+    language: Language,
+    *,
+    proof: str,
+    is_in_diagnosis: bool,
 ) -> CriterionLine:
     has_full_marks = result.marks >= result.max_marks
     failures = [item for item in result.evidence if not item.passed]
@@ -245,6 +266,7 @@ def _build_criterion_line(
         moment="" if watched_failure is None else format_moment_link(watched_failure.trial + 1, seconds),
         watch="" if watched_failure is None else _format_watch_label(grade, watched_failure.trial, seconds, language),
         for_staff=to_display_text(result.for_staff, 1000, lines=4),
+        proof=proof,
         pool=result.pool.note if result.pool is not None else "",
     )
 

@@ -30,9 +30,9 @@ from sim.motion import measure_gap
 from sim.recording import Pose
 from sim.robot import get_default_robot_name
 from submissions.assignment.criterion_parts import check_given_files, read_check_sources, read_criteria
-from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
+from submissions.assignment.definition import Assignment, Parts, Reruns, Scenario, Training, WorldSpec
 from submissions.assignment.limits import Limits
-from submissions.assignment.other_parts import SAME, build_second_poses, check_robots, read_agents
+from submissions.assignment.other_parts import SAME, build_second_poses, check_reruns, check_robots, read_agents
 from submissions.assignment.pools import read_draw
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import Problems, check_table, check_unique_id, filter_texts, read_tables
@@ -40,6 +40,7 @@ from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
     PartsTable,
+    RerunsTable,
     ScenarioTable,
     TrainingTable,
     WorldTable,
@@ -50,7 +51,7 @@ from submissions.suggestions import join_with_or, suggest_name
 from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
-_TABLES = ("world", "parts", "agents", "limits", "training", "scenario", "criterion")
+_TABLES = ("world", "parts", "agents", "limits", "training", "reruns", "scenario", "criterion")
 _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 _MAX_TRIALS = 5000
 #: Maximum entries of a list or table in the file. A list of poses is the longest, with at least one trial per pose.
@@ -76,6 +77,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
     world_table = check_table(WorldTable, document.get("world", {}), ("world",), problems)
     parts = check_table(PartsTable, document.get("parts", {}), ("parts",), problems)
     limits = check_table(LimitsTable, document.get("limits", {}), ("limits",), problems)
+    reruns = check_table(RerunsTable, document.get("reruns", {}), ("reruns",), problems)
     ground = _load_floor(world_table or _read_background_only(document), files, problems)
     world = _build_world(world_table, ground, files, problems) if world_table and ground else None
     is_robotless = _runs_no_robot(document)
@@ -99,11 +101,13 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         training_table = check_table(TrainingTable, document["training"], ("training",), problems)
         training = _build_training(training_table, scenarios, ground, problems) if training_table else None
     check_given_files(document, problems)
+    if reruns and parts:
+        check_reruns(reruns, parts, context.robots, agents, scenarios, problems)
     given_parts = read_check_sources(criteria, files, problems)
     given_parts |= _read_given_parts(parts, is_robotless, files, problems) if parts else {}
     given_parts |= agents_sources
     given_files = _collect_given_files(document, files, problems)
-    if problems.found or not (head and world and parts and limits):
+    if problems.found or not (head and world and parts and limits and reruns):
         return None
     assignment = Assignment(
         id=head.id,
@@ -128,6 +132,7 @@ def build_assignment(document: Mapping[str, object], files: Files, problems: Pro
         ),
         training=training,
         secret=head.secret,
+        reruns=Reruns(**reruns.model_dump()),
     )
     if assignment.trial_count > _MAX_TRIALS:
         problems.add(("scenario",), f"the scenarios ask for too many trials, expected at most {_MAX_TRIALS} in all")

@@ -65,6 +65,21 @@ class Training:
 
 
 @dataclass(frozen=True, slots=True)
+class Reruns:
+    """What students learn from reruns of their trials with one ingredient exchanged.
+
+    With ``halves``, the reference's parts take the place of the student's, to show which part loses the marks.
+    ``reveals`` is the number of causes in hidden trials that one student may see; staff see all.
+    """
+
+    halves: bool = False
+    reveals: int = 0
+
+
+NO_RERUNS = Reruns()
+
+
+@dataclass(frozen=True, slots=True)
 class Trial:
     """One run of an assignment. ``pose`` is the start pose, with offset and jitter applied."""
 
@@ -98,6 +113,7 @@ class Assignment:
     version: str = ""  # SHA-256 of the assignment's folder
     training: Training | None = None
     secret: str = ""  # makes the seeds of hidden scenarios hard to guess
+    reruns: Reruns = NO_RERUNS
 
     @property
     def max_marks(self) -> Decimal:

@@ -8,13 +8,14 @@ from __future__ import annotations
 import builtins
 import keyword
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from sim.errors import UsageError
 from sim.recording import Pose
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import Problems, filter_tables
-from submissions.assignment.schema import PartsTable, ScenarioTable, WorldTable
+from submissions.assignment.scenario import Scenario
+from submissions.assignment.schema import PartsTable, RerunsTable, ScenarioTable, WorldTable
 from submissions.source_text import decode_source
 
 #: Value of ``second_program``: the second robot runs the program of the first.
@@ -100,6 +101,26 @@ def check_robots(document: Mapping[str, object], world: WorldTable, parts: Parts
     for number, raw in enumerate(scenarios):
         if "second_poses" not in raw:
             problems.add(("scenario", number), "second_poses is missing, expected where the second robot starts")
+
+
+def check_reruns(
+    reruns: RerunsTable,
+    parts: PartsTable,
+    robots: int,
+    agents: Mapping[str, str],
+    scenarios: Sequence[Scenario | None],
+    problems: Problems,
+) -> None:
+    """Report halves of a submission with only one part, and hidden causes without a hidden scenario."""
+    sources = [parts.program, parts.responder, *agents.values()]
+    # Without a second robot, the default of its program means nothing.
+    sources += [parts.second_program] if robots == 2 else []
+    if reruns.halves and sources.count("student") < 2:
+        sentence = "halves is true, but students write one part, expected it with two parts from the student"
+        problems.add(("reruns", "halves"), sentence)
+    if reruns.reveals and all(each is None or each.visibility == "visible" for each in scenarios):
+        sentence = f"reveals is {reruns.reveals}, but every scenario is visible, expected a hidden scenario with it"
+        problems.add(("reruns", "reveals"), sentence)
 
 
 def build_second_poses(table: ScenarioTable, poses: int, table_path: Place, problems: Problems) -> tuple[Pose, ...]:

@@ -222,6 +222,13 @@ class TrainingTable(StrictTable):
     image: Literal["focus", "whole"] = "focus"
 
 
+class RerunsTable(StrictTable):
+    """What students learn from reruns of their trials."""
+
+    halves: bool = False
+    reveals: int = Field(default=0, ge=0, le=100)
+
+
 class LimitsTable(StrictTable):
     """Limits for one trial, and for all trials together (``all_``)."""
 

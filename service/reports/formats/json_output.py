@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from service.grading.grade import Accuracy, Grade, PoolValue, StaffAdjustment
+from service.grading.grade import Accuracy, Grade, PoolValue, ShownCause, StaffAdjustment
 from service.reports.diagnosis import Excerpt, diagnose
 from service.reports.display_text import to_json_number
 from service.reports.formats.registry import register_document, register_refusal, register_table
@@ -39,6 +39,7 @@ def build_json_document(view: View, submission: Submission | None = None) -> dic
         "verdict": grade.verdict.value,
         "cause": replace_surrogates(diagnosis.cause),
         "next_step": replace_surrogates(diagnosis.next_step),
+        **({"proof": replace_surrogates(diagnosis.proof)} if diagnosis.proof else {}),
         **({"excerpt": _excerpt_to_json(diagnosis.excerpt)} if diagnosis.excerpt else {}),
         "lost_by_cause": [grade.criteria[index].id for index in sorted(diagnosis.lost)],
         **({"hints": [replace_surrogates(hint) for hint in format_hints(grade)]} if grade.hints else {}),
@@ -55,6 +56,7 @@ def build_json_document(view: View, submission: Submission | None = None) -> dic
             }
             for result in grade.criteria
         ],
+        **({"causes": [_cause_to_json(cause) for cause in grade.causes]} if grade.causes else {}),
         "trials": [
             {
                 "scenario": trial.scenario,
@@ -134,6 +136,16 @@ def _adjustment_to_json(adjustment: StaffAdjustment) -> dict[str, Any]:
         "of": to_json_number(adjustment.worth),
         "excused": adjustment.excused,
         "reason": replace_surrogates(adjustment.reason),
+    }
+
+
+def _cause_to_json(cause: ShownCause) -> dict[str, Any]:
+    """Return what reruns showed for a criterion."""
+    return {
+        "criterion": cause.criterion,
+        "text": replace_surrogates(cause.text),
+        "next_step": replace_surrogates(cause.next_step),
+        "for_staff": cause.for_staff,
     }
 
 

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from service.grading.grade import Grade, PoolValue
 from service.grading.pools.pool_sentences import round_outwards
-from service.reports.diagnosis import describe_outcome, diagnose, format_excerpt
+from service.reports.diagnosis import describe_outcome, diagnose, format_excerpt, list_further_proofs
 from service.reports.display_text import format_decimal, to_display_text, to_one_line
 from service.reports.faults import FaultGroup, describe_other_faults
 from service.reports.formats.registry import register_terminal
@@ -43,11 +43,19 @@ def render_rich_report(view: View, submission: Submission | None = None) -> Rend
         (verdict_words.short, _STYLES[verdict_words.tone]), ". ", describe_outcome(grade, diagnosis)
     )
     cause = Group(
-        Text(diagnosis.cause, style="bold"), *map(Text, format_excerpt(diagnosis)), Text(f"Next: {diagnosis.next_step}")
+        Text(diagnosis.cause, style="bold"),
+        *map(Text, format_excerpt(diagnosis)),
+        *([Text(f"Shown by running it again: {diagnosis.proof}")] if diagnosis.proof else []),
+        Text(f"Next: {diagnosis.next_step}"),
     )
     comments = [Padding(Text(f"Comment: {comment}"), (0, 0, 0, 2)) for comment in format_comments(grade)]
     parts: list[RenderableType] = [heading, Padding(cause, (0, 0, 0, 2)), *comments]
     parts += [build_marks_table(grade, diagnosis.lost), verdict]
+    further_proofs = list_further_proofs(grade, diagnosis)
+    parts += [
+        Text(f"{to_one_line(grade.criteria[index].title)}: shown by running it again: {proof}")
+        for index, proof in further_proofs.items()
+    ]
     parts += [Text(further) for further in diagnosis.further]
     parts += [_render_fault(told, group) for told, group in describe_other_faults(diagnosis.cause, grade)]
     if grade.accuracy is not None:

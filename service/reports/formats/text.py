@@ -8,7 +8,7 @@ from __future__ import annotations
 import textwrap
 
 from service.grading.grade import CriterionResult
-from service.reports.diagnosis import Diagnosis, describe_outcome, diagnose, format_excerpt
+from service.reports.diagnosis import Diagnosis, describe_outcome, diagnose, format_excerpt, list_further_proofs
 from service.reports.display_text import format_decimal, to_display_text, to_one_line
 from service.reports.faults import FaultGroup, describe_other_faults
 from service.reports.formats.registry import register_document
@@ -35,16 +35,18 @@ def render_plain_text(view: View, submission: Submission | None = None) -> str:
     lines = [title, "=" * min(len(title), _WIDTH), ""]
     lines += [f"{format_decimal(grade.marks)} of {format_decimal(grade.max_marks)} marks; {verdict_words.short}", ""]
     lines += [*_wrap_text(f"→ {diagnosis.cause}", indent=2), *_format_excerpt_block(diagnosis)]
+    lines += _wrap_text(f"  Shown by running it again: {diagnosis.proof}", indent=2) if diagnosis.proof else []
     lines += [*_wrap_text(f"  Next: {diagnosis.next_step}", indent=2), ""]
     for comment in format_comments(grade):
         lines += [*_wrap_text(f"Comment: {comment}", indent=2), ""]
-    cause_criteria = [grade.criteria[index] for index in sorted(diagnosis.lost)]
-    for result in cause_criteria:
-        lines += _format_criterion(result, "")
-    other_criteria = [each for index, each in enumerate(grade.criteria) if index not in diagnosis.lost]
-    lines += [""] if cause_criteria and other_criteria else []
-    for result in other_criteria:
-        lines += _format_criterion(result, to_display_text(result.message, 600, lines=6))
+    proofs = list_further_proofs(grade, diagnosis)
+    for index in sorted(diagnosis.lost):
+        lines += _format_criterion(grade.criteria[index], "", proofs.get(index, ""))
+    other_indices = [index for index in range(len(grade.criteria)) if index not in diagnosis.lost]
+    lines += [""] if diagnosis.lost and other_indices else []
+    for index in other_indices:
+        message = to_display_text(grade.criteria[index].message, 600, lines=6)
+        lines += _format_criterion(grade.criteria[index], message, proofs.get(index, ""))
     lines += ["", *_wrap_text(describe_outcome(grade, diagnosis))]
     for cause in diagnosis.further:
         lines += ["", *_wrap_text(cause)]
@@ -61,10 +63,11 @@ def render_plain_text(view: View, submission: Submission | None = None) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _format_criterion(result: CriterionResult, message: str) -> list[str]:
+def _format_criterion(result: CriterionResult, message: str, proof: str) -> list[str]:
     marks = f"{format_decimal(result.marks)}/{format_decimal(result.max_marks)}"
     lines = _wrap_text(f"{marks:>9}  {to_one_line(result.title)}", indent=11)
     lines += _wrap_text(" " * 11 + message, indent=11) if message else []
+    lines += _wrap_text(f"{' ' * 11}Shown by running it again: {proof}", indent=11) if proof else []
     if result.pool is not None and result.pool.note:
         lines += _wrap_text(f"{' ' * 11}{result.pool.note}", indent=11)
     staff = f"For staff: {to_display_text(result.for_staff, 600)}"

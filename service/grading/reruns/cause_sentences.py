@@ -1,0 +1,310 @@
+"""Sentences on causes: the exchange and what the reruns showed with it. They claim nothing else.
+
+A sentence is made from the reruns of a cause. Neither the reference's text nor its answers are part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from decimal import Decimal
+from types import MappingProxyType
+
+from service.grading.grade import ShownCause
+from service.grading.reruns.causes import Cause, CauseKind
+from service.grading.reruns.engine import Rerun
+from service.grading.reruns.exchanges import (
+    AnswersFrom,
+    Exchange,
+    GivenPart,
+    MoreTime,
+    VisibleStart,
+    WithoutChannelEffect,
+    WithoutLightNoise,
+    WithoutMessageLoss,
+    WithoutMotorNoise,
+)
+from service.grading.reruns.halves import decide_losing_parts, find_first_difference
+from service.language import translatable
+from sim.sentences import Sentence, join_sentences, join_with_and
+
+_EFFECTS: Mapping[str, str] = MappingProxyType(
+    {
+        "duplication": translatable("no message duplicated"),
+        "reordering": translatable("no message out of order"),
+        "corruption": translatable("no message changed"),
+        "jitter": translatable("the same delay for every message"),
+    }
+)
+
+
+def build_shown_causes(causes: Sequence[Cause], reveals: int = 0) -> tuple[ShownCause, ...]:
+    """Return the causes for reports, one for each criterion. Of those in hidden trials, students see ``reveals``."""
+    shown_causes: list[ShownCause] = []
+    revealed_count = 0
+    for criterion in dict.fromkeys(each.criterion for each in causes):
+        group = [each for each in causes if each.criterion == criterion]
+        text = join_sentences(*(describe_cause(each) for each in group))
+        if not text:
+            continue
+        is_hidden = any(each.is_hidden for each in group)
+        if is_hidden:
+            text = join_sentences(Sentence("In a hidden trial:"), text)
+            revealed_count += 1
+        shown_causes.append(
+            ShownCause(criterion, text, describe_next_step(group[0]), is_hidden and revealed_count > reveals)
+        )
+    return tuple(shown_causes)
+
+
+def describe_cause(cause: Cause) -> str:
+    """Return one or more sentences: what was exchanged, and what the reruns showed; empty for an unknown kind."""
+    describe = _DESCRIPTIONS.get(cause.kind)
+    return "" if describe is None else describe(cause.reruns, cause.criterion)
+
+
+def describe_next_step(cause: Cause) -> str:
+    """Return what the student does next about a cause."""
+    match cause.kind:
+        case "parts":
+            return _describe_part_step(cause)
+        case "time":
+            return Sentence("Make your program faster, or its waits shorter, then submit again.")
+        case "start":
+            return Sentence("Make your program independent of the start pose, then submit again.")
+    exchanges = [exchange for rerun in cause.reruns for exchange in rerun.exchanges]
+    if any(isinstance(each, WithoutMessageLoss) for each in exchanges):
+        return Sentence("Send a message again if its answer does not arrive, then submit again.")
+    if any(isinstance(each, WithoutLightNoise | WithoutMotorNoise) for each in exchanges):
+        return Sentence("Make your program work with noise: decide by more than one reading, then submit again.")
+    return Sentence("Make your program work under these conditions, then submit again.")
+
+
+def _describe_part_step(cause: Cause) -> str:
+    reruns = [rerun for rerun in cause.reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
+    losing = decide_losing_parts(reruns, cause.criterion)
+    match losing:
+        case ("responder",):
+            return Sentence("Fix your responder, then submit again.")
+        case ("program",):
+            return Sentence("Fix your program, then submit again.")
+        case ("program", "responder") if all(rerun.passes(cause.criterion) for rerun in reruns):
+            return Sentence(
+                "Compare the texts that your program sends and expects with those that your responder expects and "
+                "answers, then submit again."
+            )
+    return Sentence("Fix these parts, then submit again: %(parts)s.", parts=join_with_and(losing))
+
+
+def describe_result(rerun: Rerun, criterion: str) -> str:
+    """Return the result of a rerun that loses nothing, as a verb phrase."""
+    outcome = rerun.outcomes[criterion]
+    if outcome.is_whole:
+        if outcome.max_marks == 1:
+            return Sentence("gets the mark")
+        return Sentence("gets all %(marks)s marks", marks=_format_marks(outcome.marks))
+    count = len((outcome.passed | outcome.failed) & rerun.recordings.keys())
+    if count == 1:
+        return Sentence("passes in the trial that was run again")
+    return Sentence("passes in all %(count)s trials that were run again", count=count)
+
+
+def _format_marks(marks: Decimal) -> str:
+    return f"{marks.normalize():f}"
+
+
+def _describe_parts(reruns: Sequence[Rerun], criterion: str) -> str:
+    part_reruns = [rerun for rerun in reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
+    losing = decide_losing_parts(part_reruns, criterion)
+    if not losing:
+        return ""
+    single = {_get_parts(rerun)[0]: rerun for rerun in part_reruns if len(rerun.exchanges) == 1}
+    parts = tuple(single)
+    if not all(single[part].passes(criterion) for part in losing):
+        return _describe_parts_that_still_lose(losing, parts)
+    if len(losing) > 1:
+        return _describe_misfit(single, losing, criterion)
+    (part,) = losing
+    result = describe_result(single[part], criterion)
+    if len(parts) > 2 or part not in _SINGLE_PARTS:
+        sentence: str = Sentence(
+            "With the reference's part %(part)s in place of yours, the rest of your submission %(result)s: this part "
+            "loses the marks.",
+            part=part,
+            result=result,
+        )
+    else:
+        sentence = Sentence(_SINGLE_PARTS[part], result=result)
+    if part != "responder":
+        return sentence
+    return join_sentences(
+        sentence, _describe_first_difference(single[part]), _describe_losing_answer(reruns, criterion)
+    )
+
+
+_SINGLE_PARTS: Mapping[str, str] = MappingProxyType(
+    {
+        "responder": translatable(
+            "With the reference's responder in place of yours, the same program %(result)s: the responder loses the "
+            "marks."
+        ),
+        "program": translatable(
+            "With the reference's program in place of yours, the same responder %(result)s: the program loses the "
+            "marks."
+        ),
+    }
+)
+
+
+def _describe_parts_that_still_lose(losing: Sequence[str], parts: Sequence[str]) -> str:
+    if set(losing) == {"program", "responder"} == set(parts):
+        return Sentence(
+            "With the reference's responder in place of yours, your program still loses marks, and with the "
+            "reference's program in place of yours, your responder still loses marks."
+        )
+    if len(losing) > 1:
+        return Sentence(
+            "With the reference's parts in place of the others, each of these parts still loses marks: %(parts)s.",
+            parts=join_with_and(losing),
+        )
+    (part,) = losing
+    if len(parts) == 2 and part == "program":
+        return Sentence("With the reference's responder in place of yours, your program still loses marks.")
+    if len(parts) == 2 and part == "responder":
+        return Sentence("With the reference's program in place of yours, your responder still loses marks.")
+    return Sentence(
+        "With the reference's parts in place of all others, your part %(part)s still loses marks.", part=part
+    )
+
+
+def _describe_misfit(single: Mapping[str, Rerun], losing: Sequence[str], criterion: str) -> str:
+    """Describe parts each of which the reference's replaces without loss."""
+    if set(losing) == {"program", "responder"} == set(single):
+        return Sentence(
+            "With the reference's responder in place of yours, the same program %(first)s. With the reference's "
+            "program in place of yours, the same responder %(second)s. Your program and your responder do not fit "
+            "together.",
+            first=describe_result(single["responder"], criterion),
+            second=describe_result(single["program"], criterion),
+        )
+    return Sentence(
+        "With one of these parts of the reference in place of yours, the rest of your submission loses no marks: "
+        "%(parts)s.",
+        parts=join_with_and(losing),
+    )
+
+
+def _describe_first_difference(rerun: Rerun) -> str:
+    numbers = (find_first_difference(rerun.originals[trial], rerun.recordings[trial]) for trial in rerun.trials)
+    number = next((each for each in numbers if each is not None), None)
+    return "" if number is None else Sentence("The first answer that differs is number %(number)s.", number=number)
+
+
+def _describe_losing_answer(reruns: Sequence[Rerun], criterion: str) -> str:
+    passing: int | None = None
+    failing: int | None = None
+    for rerun in reruns:
+        for exchange in rerun.exchanges:
+            if isinstance(exchange, AnswersFrom) and rerun.passes(criterion):
+                passing = exchange.number
+            elif isinstance(exchange, AnswersFrom) and rerun.loses(criterion):
+                failing = exchange.number
+    if passing is None or failing != passing + 1:
+        return ""
+    return Sentence(
+        "With the reference's answers from number %(number)s on, the trial passes; from number %(next)s on, it still "
+        "fails.",
+        number=passing,
+        next=failing,
+    )
+
+
+def _describe_conditions(reruns: Sequence[Rerun], criterion: str) -> str:
+    first, *others = reruns
+    if not first.passes(criterion):
+        return ""
+    sentence = Sentence(
+        "With %(conditions)s, the same submission %(result)s.",
+        conditions=join_with_and([_describe_condition(each) for each in first.exchanges]),
+        result=describe_result(first, criterion),
+    )
+    return join_sentences(sentence, *(_describe_messages(each.exchanges) for each in others if each.passes(criterion)))
+
+
+def _describe_condition(exchange: Exchange) -> str:
+    match exchange:
+        case WithoutLightNoise():
+            return Sentence("the light noise off")
+        case WithoutMotorNoise():
+            return Sentence("the motor noise off")
+        case WithoutMessageLoss():
+            return Sentence("no message lost")
+        case WithoutChannelEffect(effect=effect):
+            return Sentence(_EFFECTS[effect])
+    return exchange.key
+
+
+def _describe_messages(exchanges: Sequence[Exchange]) -> str:
+    """Describe the messages of a trial that passes if these are not lost."""
+    numbers = sorted(
+        number for each in exchanges if isinstance(each, WithoutMessageLoss) for number in each.numbers or ()
+    )
+    if len(numbers) == 1:
+        return Sentence(
+            "In one trial it is enough that message %(number)s and its answer are not lost.", number=numbers[0]
+        )
+    return Sentence(
+        "In one trial it is enough that messages %(numbers)s and their answers are not lost.",
+        numbers=join_with_and([str(number) for number in numbers]),
+    )
+
+
+def _describe_chance(reruns: Sequence[Rerun], criterion: str) -> str:
+    passes = sum(rerun.passes(criterion) for rerun in reruns)
+    if not passes:
+        return ""
+    return Sentence(
+        "With %(count)s other random draws of the same noise, one failed trial passes %(passes)s times.",
+        count=len(reruns),
+        passes=passes,
+    )
+
+
+def _describe_time(reruns: Sequence[Rerun], criterion: str) -> str:
+    (rerun,) = reruns
+    if not rerun.passes(criterion):
+        return ""
+    (factor,) = (each.factor for each in rerun.exchanges if isinstance(each, MoreTime))
+    return Sentence(
+        "With %(factor)s times the simulated time, the same submission %(result)s.",
+        factor=f"{factor:g}",
+        result=describe_result(rerun, criterion),
+    )
+
+
+def _describe_start(reruns: Sequence[Rerun], criterion: str) -> str:
+    (rerun,) = reruns
+    if not rerun.passes(criterion):
+        return ""
+    (pose,) = (each.pose for each in rerun.exchanges if isinstance(each, VisibleStart))
+    return Sentence(
+        "From the start of a trial that passed, x %(x)s, y %(y)s, heading %(heading)s degrees, a failed trial passes "
+        "too.",
+        x=f"{pose.x:g}",
+        y=f"{pose.y:g}",
+        heading=f"{pose.heading:g}",
+    )
+
+
+def _get_parts(rerun: Rerun) -> tuple[str, ...]:
+    return tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart))
+
+
+_DESCRIPTIONS: Mapping[CauseKind, Callable[[Sequence[Rerun], str], str]] = MappingProxyType(
+    {
+        "parts": _describe_parts,
+        "conditions": _describe_conditions,
+        "chance": _describe_chance,
+        "time": _describe_time,
+        "start": _describe_start,
+    }
+)

@@ -1,0 +1,230 @@
+"""Causes: for each criterion with lost marks, the smallest exchange with which a rerun does not lose them.
+
+``cause_sentences.py`` describes a cause, from its reruns alone.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeVar
+
+from service.grading.reruns.engine import DEFAULT_BUDGET, Budget, BudgetSpent, Rerun, RerunEngine
+from service.grading.reruns.exchanges import (
+    Exchange,
+    MoreTime,
+    OtherNoise,
+    VisibleStart,
+    WithoutChannelEffect,
+    WithoutLightNoise,
+    WithoutMessageLoss,
+    WithoutMotorNoise,
+    list_texts_and_answers,
+)
+from service.grading.reruns.halves import (
+    find_losing_answer,
+    find_losing_parts,
+    list_student_parts,
+)
+from service.grading.run_plan import RunPlan
+from sim.random_streams import RandomStream
+from sim.recording import Recording, Verdict
+from submissions.assignment.definition import Trial
+
+#: The ingredient that was exchanged: parts of the submission, noise or messages, chance, time, the start pose, or the
+#: text of a part.
+CauseKind = Literal["parts", "conditions", "chance", "time", "start", "source"]
+Item = TypeVar("Item")
+_OTHER_NOISES = 5
+_MAX_CAUSES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Why a criterion lost marks, and the reruns that prove it. ``is_hidden`` if any of their trials is hidden."""
+
+    criterion: str
+    kind: CauseKind
+    reruns: tuple[Rerun, ...]
+    is_hidden: bool = False
+
+
+#: Finds causes of the lost marks of a criterion. It may raise BudgetSpent.
+CauseFinder = Callable[[RerunEngine, str], Iterator[Cause]]
+
+
+def find_causes(
+    engine: RerunEngine,
+    reference: RunPlan | None = None,
+    finders: Sequence[CauseFinder] = (),
+    budget: Budget = DEFAULT_BUDGET,
+    explained: Collection[str] = (),
+) -> tuple[Cause, ...]:
+    """Return the causes of each criterion with lost marks, in the order of the criteria; at most three for each.
+
+    Args:
+        engine: The engine, for the trials that may be run again.
+        reference: The plan of the reference, if its parts may take the place of the student's.
+        finders: Further searches, after those of this module.
+        budget: What each criterion may cost.
+        explained: The ids of criteria whose causes are known.
+
+    Raises:
+        HostError: The machine failed.
+        Exception: Whatever the heartbeat of the engine raises.
+    """
+    own_finders = (_build_part_finder(reference), _find_conditions, _find_time, _find_start)
+    causes: list[Cause] = []
+    for criterion in engine.assignment.criteria:
+        if criterion.id not in engine.lost_criteria or not criterion.judges_runs or criterion.result_needed:
+            continue
+        if criterion.id in explained or not engine.list_trials(criterion.id):
+            continue
+        engine.start_cause(budget)
+        found_causes: list[Cause] = []
+        try:
+            for finder in (*own_finders, *finders):
+                found_causes += itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes))
+        except BudgetSpent:
+            pass
+        causes += found_causes
+    return tuple(causes)
+
+
+def _build_cause(engine: RerunEngine, criterion: str, kind: CauseKind, *reruns: Rerun) -> Cause:
+    is_hidden = any(engine.results[trial].visibility != "visible" for rerun in reruns for trial in rerun.trials)
+    return Cause(criterion, kind, reruns, is_hidden)
+
+
+def _build_part_finder(reference: RunPlan | None) -> CauseFinder:
+    def find_part(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
+        parts = list_student_parts(engine.assignment)
+        if reference is None or not engine.has_exchangeable_parts or len(parts) < 2:
+            return
+        reruns = find_losing_parts(engine, criterion, parts, reference)
+        if not reruns:
+            return
+        answer: tuple[Rerun, ...] = ()
+        responder_rerun = reruns[parts.index("responder")] if "responder" in parts else None
+        if responder_rerun is not None and responder_rerun.passes(criterion):
+            answer = find_losing_answer(engine, criterion, responder_rerun, reference) or ()
+        yield _build_cause(engine, criterion, "parts", *reruns, *answer)
+
+    return find_part
+
+
+def _find_conditions(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
+    """Yield the smallest set of noises and effects of the channel without which nothing is lost, then the chance."""
+    trial = _choose_failed_trial(engine, criterion)
+    conditions = _list_conditions(engine.trials[trial], engine.results[trial].recording)
+    smallest = find_smallest(conditions, lambda exchanges: _rerun_if_passing(engine, criterion, exchanges))
+    if smallest is None:
+        return
+    reruns = [smallest]
+    if smallest.exchanges == (WithoutMessageLoss(),):
+        messages = _list_lost_messages(engine.results[trial].recording)
+        single = find_smallest(
+            messages,
+            lambda numbers: _check_trial(engine, criterion, trial, WithoutMessageLoss(frozenset(numbers))),
+        )
+        reruns += [] if single is None else [single]
+    yield _build_cause(engine, criterion, "conditions", *reruns)
+    if any(isinstance(each, WithoutLightNoise | WithoutMotorNoise) for each in smallest.exchanges):
+        seeds = RandomStream(engine.trials[trial].seed, "other noise")
+        others = [engine.rerun((trial,), (OtherNoise(seeds.integer(number)),)) for number in range(_OTHER_NOISES)]
+        if any(each.passes(criterion) for each in others):
+            yield _build_cause(engine, criterion, "chance", *others)
+
+
+def _find_time(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
+    """Yield the time as the cause, if the trial ended at its limit and passes with more."""
+    trial = _choose_failed_trial(engine, criterion)
+    if engine.results[trial].verdict is Verdict.TIME_LIMIT:
+        rerun = _rerun_if_passing(engine, criterion, (MoreTime(),))
+        if rerun is not None:
+            yield _build_cause(engine, criterion, "time", rerun)
+
+
+def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
+    """Yield the start pose as the cause, if a trial passes from the start of a visible trial that passed."""
+    failed_trials = engine.list_failed_trials(criterion)
+    for trial in failed_trials[:1]:
+        definition = engine.trials[trial]
+        for other in engine.list_trials(criterion):
+            pose = engine.trials[other].pose
+            if other in failed_trials or engine.results[other].visibility != "visible" or pose == definition.pose:
+                continue
+            rerun = engine.rerun((trial,), (VisibleStart(pose, other),))
+            if rerun.passes(criterion):
+                yield _build_cause(engine, criterion, "start", rerun)
+            return
+
+
+def _choose_failed_trial(engine: RerunEngine, criterion: str) -> int:
+    """Return the first trial that the criterion lost marks in; the first of all if it names none."""
+    return next(iter((*engine.list_failed_trials(criterion), *engine.list_trials(criterion))))
+
+
+def _list_conditions(trial: Trial, recording: Recording) -> tuple[Exchange, ...]:
+    """Return an exchange for each noise and effect of the channel that the trial has."""
+    channel = trial.channel
+    conditions: list[Exchange] = []
+    if trial.light_noise:
+        conditions.append(WithoutLightNoise())
+    if trial.motor_noise:
+        conditions.append(WithoutMotorNoise())
+    if not recording.messages:
+        return tuple(conditions)
+    if channel.loss:
+        conditions.append(WithoutMessageLoss())
+    if channel.duplication:
+        conditions.append(WithoutChannelEffect("duplication"))
+    if channel.reordering:
+        conditions.append(WithoutChannelEffect("reordering"))
+    if channel.corruption:
+        conditions.append(WithoutChannelEffect("corruption"))
+    if channel.jitter:
+        conditions.append(WithoutChannelEffect("jitter"))
+    return tuple(conditions)
+
+
+def _list_lost_messages(recording: Recording) -> tuple[int, ...]:
+    """Return the numbers, from 1, of the robot's texts that chance lost, or whose answers it lost."""
+    return tuple(
+        number
+        for number, (text, answers) in enumerate(list_texts_and_answers(recording), start=1)
+        if any(each.lost == "chance" for each in (text, *answers))
+    )
+
+
+def _rerun_if_passing(engine: RerunEngine, criterion: str, exchanges: Sequence[Exchange]) -> Rerun | None:
+    rerun = engine.rerun_criterion(criterion, exchanges)
+    return rerun if rerun.passes(criterion) else None
+
+
+def _check_trial(engine: RerunEngine, criterion: str, trial: int, exchange: Exchange) -> Rerun | None:
+    rerun = engine.rerun((trial,), (exchange,))
+    return rerun if rerun.passes(criterion) else None
+
+
+def find_smallest(items: Sequence[Item], check: Callable[[Sequence[Item]], Rerun | None]) -> Rerun | None:
+    """Return the rerun with a smallest set of exchanged items that passes; None if all items together don't.
+
+    ``check`` returns the rerun with these items exchanged if it passes. Single items are tried first, in order; if none
+    passes, items are removed from the set one after the other, as long as it passes without them.
+    """
+    best = check(items) if items else None
+    if best is None or len(items) == 1:
+        return best
+    for item in items:
+        single = check((item,))
+        if single is not None:
+            return single
+    needed = list(items)
+    for item in items:
+        fewer = [each for each in needed if each is not item]
+        rerun = check(fewer) if len(fewer) > 1 else None
+        if rerun is not None:
+            best, needed = rerun, fewer
+    return best

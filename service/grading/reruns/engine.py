@@ -1,0 +1,259 @@
+"""The rerun engine: runs trials of a grade again with ingredients exchanged, within a budget, and judges the result.
+
+Equal reruns are run once. Nothing here is marked or stored, and the same reruns give the same results.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+
+from responders.sandbox.meter import JobLimits, JobMeter
+from service.grading.grade import CriterionResult, Grade, TrialResult
+from service.grading.judging.judge_declaration import StaticAnalysis
+from service.grading.judging.limited_judging import compute_judging_limits, judge_within_limits
+from service.grading.notebook_trial import NotebookTrial
+from service.grading.reruns.exchanges import Exchange, GivenPart, apply_exchanges
+from service.grading.run_plan import RunPlan
+from service.grading.static_analysis import analyse
+from service.grading.trial_runner import TrialRunner
+from service.grading.trial_specs import build_trial_spec
+from sim.errors import UsageError
+from sim.recording import Recording
+from submissions.assignment.definition import Assignment, Trial
+from submissions.criteria.code import PythonCheck
+from submissions.seeds import PUBLIC_SECRET, SeedSource
+
+_VISIBLE = "visible"
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What the search for one cause may cost: trials run, and CPU seconds of the worker and its children."""
+
+    runs: int = 60
+    cpu_seconds: float = 5.0
+
+
+DEFAULT_BUDGET = Budget()
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """What the search for one cause has cost so far."""
+
+    runs: int
+    cpu_seconds: float
+
+
+class BudgetSpent(Exception):
+    """Raised instead of a rerun that the budget does not pay for."""
+
+
+@dataclass(frozen=True, slots=True)
+class RerunOutcome:
+    """The result of one criterion with the reruns in place of the recorded trials.
+
+    ``passed`` and ``failed`` are indices of trials in the grade. ``is_whole`` says whether every trial that the
+    criterion judges was run again, so that ``marks`` are those of the exchange; otherwise they mix old and new trials.
+    """
+
+    marks: Decimal
+    max_marks: Decimal
+    passed: frozenset[int]
+    failed: frozenset[int]
+    is_whole: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Rerun:
+    """Trials that were run again with the same exchanges: old and new recordings by trial, outcomes by criterion."""
+
+    exchanges: tuple[Exchange, ...]
+    originals: Mapping[int, Recording] = field(repr=False)
+    recordings: Mapping[int, Recording] = field(repr=False)
+    outcomes: Mapping[str, RerunOutcome]
+
+    @property
+    def trials(self) -> tuple[int, ...]:
+        """The indices in the grade of the trials that were run again."""
+        return tuple(self.recordings)
+
+    def passes(self, criterion: str) -> bool:
+        """Return whether a criterion loses nothing: all its marks, or every trial if only some were run again."""
+        outcome = self.outcomes[criterion]
+        if outcome.is_whole:
+            return outcome.marks >= outcome.max_marks
+        judged_trials = (outcome.passed | outcome.failed) & self.recordings.keys()
+        return bool(judged_trials) and not judged_trials & outcome.failed
+
+    def loses(self, criterion: str) -> bool:
+        """Return whether a criterion still loses marks in a trial that was run again."""
+        outcome = self.outcomes[criterion]
+        if outcome.is_whole:
+            return outcome.marks < outcome.max_marks
+        return bool(outcome.failed & self.recordings.keys())
+
+
+class RerunEngine:
+    """Runs trials of one grade again. ``visibilities`` are those of the trials that it may run and judge.
+
+    Raises UsageError for a grade of another submission or assignment than the ``plan``.
+    """
+
+    def __init__(
+        self,
+        runner: TrialRunner,
+        plan: RunPlan,
+        grade: Grade,
+        *,
+        secret: SeedSource = PUBLIC_SECRET,
+        budget: Budget = DEFAULT_BUDGET,
+        visibilities: frozenset[str] = frozenset({_VISIBLE}),
+        heartbeat: Callable[[], None] = lambda: None,
+    ) -> None:
+        if grade.submission != plan.submission or grade.assignment_version != plan.assignment.version:
+            raise UsageError("the grade is of another submission or assignment, expected those of the plan")
+        self._runner, self._plan, self._heartbeat = runner, plan, heartbeat
+        # Statements are recorded for the marks of the grade only.
+        self._trial_plan = plan.to_hidden_plan()
+        self.assignment: Assignment = plan.assignment
+        self.lost_criteria = {each.id: each for each in grade.criteria if each.marks < each.max_marks}
+        self.results: Mapping[int, TrialResult] = {
+            index: result for index, result in enumerate(grade.trials) if result.visibility in visibilities
+        }
+        self._withheld_scenarios = {each.scenario for each in grade.trials if each.visibility not in visibilities}
+        trials = {(trial.scenario.id, trial.index): trial for trial in plan.assignment.trials(secret)}
+        self.trials: Mapping[int, Trial] = {
+            index: trials[result.scenario, result.index] for index, result in self.results.items()
+        }
+        if any(result.visibility != _VISIBLE for result in self.results.values()):
+            runner.check_trial_isolation()
+        self._recordings: dict[tuple[int, tuple[str, ...]], Recording] = {}
+        self._reruns: dict[tuple[tuple[int, ...], tuple[str, ...]], Rerun] = {}
+        self.start_cause(budget)
+
+    def start_cause(self, budget: Budget = DEFAULT_BUDGET) -> None:
+        """Begin with a full budget. Reruns that are known already cost nothing."""
+        self._budget, self._runs, self._cpu_seconds = budget, 0, 0.0
+
+    @property
+    def has_exchangeable_parts(self) -> bool:
+        """Return whether parts can be exchanged: all were submitted, not as a notebook that is executed."""
+        return not isinstance(self._plan.trial, NotebookTrial) and self._plan.missing is None
+
+    @property
+    def spent(self) -> Spent:
+        """The costs since the budget was full."""
+        return Spent(self._runs, self._cpu_seconds)
+
+    def list_trials(self, criterion: str) -> tuple[int, ...]:
+        """Return the indices of the trials that a criterion judges and that may be run again."""
+        scenarios = next(each.scenarios for each in self.assignment.criteria if each.id == criterion)
+        return tuple(index for index, each in self.results.items() if not scenarios or each.scenario in scenarios)
+
+    def list_failed_trials(self, criterion: str) -> tuple[int, ...]:
+        """Return the indices of the trials that a criterion lost marks in and that may be run again."""
+        failed_trials = {each.trial for each in self.lost_criteria[criterion].evidence if not each.passed}
+        return tuple(index for index in self.list_trials(criterion) if index in failed_trials)
+
+    def rerun_criterion(self, criterion: str, exchanges: Sequence[Exchange]) -> Rerun:
+        """Run the trials of a criterion again: first one that it lost marks in, then, if that passes, all.
+
+        If the budget pays for the first trial only, the result has no others. Raises the same errors as ``rerun``.
+        """
+        judges_each_trial = next(each.judges_each_trial for each in self.assignment.criteria if each.id == criterion)
+        trials, failed_trials = self.list_trials(criterion), self.list_failed_trials(criterion)
+        if not judges_each_trial or not failed_trials:
+            return self.rerun(trials, exchanges)
+        first = self.rerun(failed_trials[:1], exchanges)
+        if not first.passes(criterion) or len(trials) == 1:
+            return first
+        try:
+            return self.rerun(trials, exchanges)
+        except BudgetSpent:
+            return first
+
+    def rerun(self, trials: Sequence[int], exchanges: Sequence[Exchange]) -> Rerun:
+        """Run these trials again with all the exchanges, and judge the criteria with them.
+
+        Raises:
+            BudgetSpent: The budget does not pay for it.
+            HostError: The machine failed.
+            Exception: Whatever the heartbeat raises.
+        """
+        keys = tuple(exchange.key for exchange in exchanges)
+        known_rerun = self._reruns.get((tuple(trials), keys))
+        if known_rerun is not None:
+            return known_rerun
+        start = time.process_time()
+        try:
+            recordings = {index: self._record(index, exchanges, keys) for index in trials}
+            rerun = Rerun(
+                tuple(exchanges),
+                {index: self.results[index].recording for index in trials},
+                recordings,
+                self._judge(recordings, exchanges),
+            )
+        finally:
+            self._cpu_seconds += time.process_time() - start
+        self._reruns[tuple(trials), keys] = rerun
+        return rerun
+
+    def _record(self, index: int, exchanges: Sequence[Exchange], keys: tuple[str, ...]) -> Recording:
+        known_recording = self._recordings.get((index, keys))
+        if known_recording is not None:
+            return known_recording
+        seconds_left = self._budget.cpu_seconds - self._cpu_seconds
+        if self._runs >= self._budget.runs or seconds_left <= 0:
+            raise BudgetSpent
+        self._runs += 1
+        meter = JobMeter(JobLimits(cpu_seconds=seconds_left), self._heartbeat)
+        spec = build_trial_spec(self.trials[index], self._trial_plan)
+        spec = apply_exchanges(replace(spec, records_lines=False), exchanges)
+        recording = self._plan.trial.run(spec, self.assignment.world.obstacles, self._runner, meter)
+        self._cpu_seconds += meter.spent.cpu_seconds
+        if meter.spent.cpu_seconds >= seconds_left:
+            # The limit of the budget may have ended the trial, so its recording proves nothing.
+            raise BudgetSpent
+        self._recordings[index, keys] = recording
+        return recording
+
+    def _judge(self, recordings: Mapping[int, Recording], exchanges: Sequence[Exchange]) -> dict[str, RerunOutcome]:
+        """Judge the criteria that judge runs. Trials that may not be run again don't take part."""
+        criteria = tuple(each for each in self.assignment.criteria if each.judges_runs)
+        assignment = replace(self.assignment, criteria=criteria)
+        indices = tuple(self.results)
+        trials = tuple(
+            replace(result, recording=recordings[index]) if index in recordings else result
+            for index, result in self.results.items()
+        )
+        results = judge_within_limits(
+            compute_judging_limits(trials), assignment, trials, self._analyse(trials, exchanges), self._heartbeat
+        )
+        return {result.id: self._build_outcome(result, indices, recordings) for result in results}
+
+    def _build_outcome(
+        self, result: CriterionResult, indices: Sequence[int], recordings: Mapping[int, Recording]
+    ) -> RerunOutcome:
+        scenarios = next(each.scenarios for each in self.assignment.criteria if each.id == result.id)
+        is_withheld = any(not scenarios or each in scenarios for each in self._withheld_scenarios)
+        return RerunOutcome(
+            result.marks,
+            result.max_marks,
+            frozenset(indices[each.trial] for each in result.evidence if each.passed),
+            frozenset(indices[each.trial] for each in result.evidence if not each.passed),
+            not is_withheld and not result.unjudged and set(self.list_trials(result.id)) <= recordings.keys(),
+        )
+
+    def _analyse(self, trials: Sequence[TrialResult], exchanges: Sequence[Exchange]) -> StaticAnalysis:
+        """Return the data that is not in the recordings: the results of the instructor's own checks."""
+        given_parts = {each.part for each in exchanges if isinstance(each, GivenPart)}
+        missing = None if self._plan.missing in given_parts else self._plan.missing
+        checks = tuple(each for each in self.assignment.criteria if isinstance(each, PythonCheck))
+        if not checks:
+            return StaticAnalysis(flags=self._plan.flags, missing=missing)
+        plan = replace(self._plan, assignment=replace(self.assignment, criteria=checks), missing=missing)
+        return analyse(plan, trials, self._runner, JobMeter(heartbeat=self._heartbeat))

@@ -1,0 +1,264 @@
+"""Exchanges: each replaces one ingredient of a trial and leaves all others as they were.
+
+An exchange changes the specification of a trial. Exchanges with the same ``key`` give the same trial.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
+
+from responders.source_file import SourceFile
+from responders.trial_spec import AgentSpec, EarlierAnswer, TrialSpec
+from service.grading.run_plan import RunPlan
+from sim.recording import SECOND, Message, Pose, Recording
+
+ChannelEffect = Literal["duplication", "reordering", "corruption", "jitter"]
+#: A part of a submission: ``program``, ``responder``, ``second program``, or the name of an agent.
+PartName = str
+SECOND_PROGRAM_PART = "second program"
+
+
+class Exchange(Protocol):
+    """Replaces one ingredient of a trial."""
+
+    @property
+    def key(self) -> str:
+        """A short text that identifies the exchange among those of a submission."""
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+
+
+@dataclass(frozen=True, slots=True)
+class WithoutLightNoise:
+    """The light sensors have no noise."""
+
+    key: str = "light noise off"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return replace(spec, noise=replace(spec.noise, light=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class WithoutMotorNoise:
+    """The wheels have no noise."""
+
+    key: str = "motor noise off"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return replace(spec, noise=replace(spec.noise, motor=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class OtherNoise:
+    """The noise of sensors and wheels has the same amplitude and another seed."""
+
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"noise of seed {self.seed}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return replace(spec, noise_seed=self.seed)
+
+
+@dataclass(frozen=True, slots=True)
+class WithoutMessageLoss:
+    """Chance loses no message; with ``numbers``, not these texts of the robot, from 1, nor their answers."""
+
+    numbers: frozenset[int] | None = None
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return "no message lost" if self.numbers is None else f"messages {sorted(self.numbers)} not lost"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        channel = spec.channel
+        if self.numbers is None:
+            return replace(spec, channel=replace(channel, loss=0.0))
+        never_lost = channel.never_lost | {number - 1 for number in self.numbers}
+        return replace(spec, channel=replace(channel, never_lost=never_lost))
+
+
+@dataclass(frozen=True, slots=True)
+class WithoutChannelEffect:
+    """The channel does not have this effect."""
+
+    effect: ChannelEffect
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"no {self.effect}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        channel = spec.channel
+        match self.effect:
+            case "duplication":
+                return replace(spec, channel=replace(channel, duplication=0.0))
+            case "reordering":
+                return replace(spec, channel=replace(channel, reordering=0.0))
+            case "corruption":
+                return replace(spec, channel=replace(channel, corruption=0.0))
+            case "jitter":
+                return replace(spec, channel=replace(channel, jitter=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class VisibleStart:
+    """The robot starts from the pose of a visible trial. ``trial`` is that trial's index in the grade."""
+
+    pose: Pose
+    trial: int
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"start {self.pose.x:g}, {self.pose.y:g}, {self.pose.heading:g}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return replace(spec, pose=self.pose)
+
+
+@dataclass(frozen=True, slots=True)
+class MoreTime:
+    """The trial lasts ``factor`` times as long, in simulated time."""
+
+    factor: float = 2.0
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"{self.factor:g} times as long"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return replace(spec, seconds=spec.seconds * self.factor)
+
+
+@dataclass(frozen=True, slots=True)
+class GivenPart:
+    """A part from another submission, such as the reference, replaces the student's. ``plan`` is that submission's."""
+
+    part: PartName
+    plan: RunPlan = field(repr=False, compare=False)
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"given {self.part}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        plan = self.plan.to_hidden_plan()
+        if self.part == "program" and plan.program is not None:
+            return replace(spec, program=plan.program, pen_down="p" in plan.flags.switches)
+        if self.part == "responder" and plan.responder is not None:
+            return replace(spec, responder=plan.responder, collaborative=True)
+        if self.part == SECOND_PROGRAM_PART and plan.second_program is not None and spec.partner is not None:
+            has_pen = "p" in plan.second_flags.switches
+            return replace(spec, partner=replace(spec.partner, program=plan.second_program, pen_down=has_pen))
+        if self.part in plan.agents:
+            return replace(spec, agents={**spec.agents, self.part: plan.agents[self.part]})
+        return spec
+
+
+@dataclass(frozen=True, slots=True)
+class AnswersFrom:
+    """The responder of another submission answers from text ``number`` on, from 1; before, ``recording`` is repeated.
+
+    It receives the earlier texts too, so that it knows what was said.
+    """
+
+    number: int
+    plan: RunPlan = field(repr=False, compare=False)
+    recording: Recording = field(repr=False, compare=False)
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"given answers from {self.number}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        spec = GivenPart("responder", self.plan).apply(spec)
+        answers = collect_earlier_answers(self.recording, self.number)
+        if spec.responder is None or answers is None:
+            return spec
+        return replace(spec, responder=replace(spec.responder, earlier_answers=answers))
+
+
+@dataclass(frozen=True, slots=True)
+class OtherSource:
+    """A part has another text under the same file name."""
+
+    part: PartName
+    text: str = field(repr=False)
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"{self.part} with the text {hashlib.sha256(self.text.encode('utf-8', 'surrogatepass')).hexdigest()}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        if self.part == "program":
+            return replace(spec, program=replace(spec.program, code=SourceFile(spec.program.code.name, self.text)))
+        if self.part == "responder" and spec.responder is not None:
+            code = SourceFile(spec.responder.code.name, self.text)
+            return replace(spec, responder=replace(spec.responder, code=code))
+        if self.part == SECOND_PROGRAM_PART and spec.partner is not None:
+            program = spec.partner.program
+            program = replace(program, code=SourceFile(program.code.name, self.text))
+            return replace(spec, partner=replace(spec.partner, program=program))
+        if self.part in spec.agents:
+            agent = spec.agents[self.part]
+            changed_agent: AgentSpec = replace(agent, code=SourceFile(agent.code.name, self.text))
+            return replace(spec, agents={**spec.agents, self.part: changed_agent})
+        return spec
+
+
+def apply_exchanges(spec: TrialSpec, exchanges: Sequence[Exchange]) -> TrialSpec:
+    """Return the trial with all these ingredients replaced."""
+    for exchange in exchanges:
+        spec = exchange.apply(spec)
+    return spec
+
+
+def list_texts_and_answers(recording: Recording) -> list[tuple[Message, list[Message]]]:
+    """Return the robot's texts in order, each with the answers to it, whether or not they arrived."""
+    answers_by_text: dict[int, list[Message]] = {
+        index: [] for index, message in enumerate(recording.messages) if message.sender == "robot"
+    }
+    for message in recording.messages:
+        if message.sender == "responder" and message.reply_to in answers_by_text:
+            answers_by_text[message.reply_to].append(message)
+    return [(recording.messages[index], answers) for index, answers in answers_by_text.items()]
+
+
+def collect_earlier_answers(recording: Recording, number: int) -> tuple[EarlierAnswer, ...] | None:
+    """Return the recorded answers to the texts before text ``number``, from 1; None if copies make them ambiguous."""
+    answers = []
+    for text, replies in list_texts_and_answers(recording)[: number - 1]:
+        if text.delivered is None:
+            continue  # the responder was not called
+        if text.note == "duplicated" or len(replies) > 1:
+            return None
+        if replies:
+            slept = round((replies[0].t - text.t) * SECOND)
+            answers.append(EarlierAnswer(replies[0].text, slept))
+        else:
+            answers.append(EarlierAnswer(None))
+    return tuple(answers)

@@ -1,0 +1,115 @@
+"""Exchanges replace one ingredient of a trial, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import pytest
+
+from judging import recorded, talk
+from responders.channel import Channel, TrialChannel
+from responders.sandbox.running_child import ChildLimits
+from responders.source_file import SourceFile
+from responders.trial_spec import EarlierAnswer, ProgramSpec, ResponderSpec, TrialSpec
+from service.grading.reruns.exchanges import (
+    Exchange,
+    MoreTime,
+    OtherNoise,
+    OtherSource,
+    VisibleStart,
+    WithoutChannelEffect,
+    WithoutLightNoise,
+    WithoutMessageLoss,
+    WithoutMotorNoise,
+    collect_earlier_answers,
+)
+from service.grading.reruns.halves import find_first_difference
+from sim.floors import build_floor
+from sim.recording import Message, Pose
+from sim.robot import get_robot
+from sim.world import Noise
+
+pytestmark = pytest.mark.fast
+
+LIMITS = ChildLimits(1.0, 64 << 20)
+SPEC = TrialSpec(
+    program=ProgramSpec(SourceFile("robot.py", "say('a')"), "preloaded", LIMITS, 1000),
+    responder=ResponderSpec(SourceFile("responder.py", "def responder(text): pass"), {}, LIMITS, 1000),
+    collaborative=True,
+    floor=build_floor("Empty_Map"),
+    robot=get_robot("Default_Robot"),
+    pose=Pose(100, 800, 0),
+    noise=Noise(8, 20),
+    channel=Channel(loss=0.4, duplication=0.2, reordering=0.3, corruption=0.1, jitter=0.5),
+    seconds=20,
+    seed=1,
+    child_seed=2,
+)
+
+
+@pytest.mark.parametrize(
+    ("exchange", "field"),
+    [
+        (WithoutLightNoise(), "noise"),
+        (WithoutMotorNoise(), "noise"),
+        (OtherNoise(7), "noise_seed"),
+        (WithoutMessageLoss(), "channel"),
+        (WithoutMessageLoss(frozenset({3})), "channel"),
+        (WithoutChannelEffect("corruption"), "channel"),
+        (VisibleStart(Pose(1, 2, 3), 0), "pose"),
+        (MoreTime(), "seconds"),
+        (OtherSource("program", "say('b')"), "program"),
+        (OtherSource("responder", "x = 1"), "responder"),
+    ],
+    ids=lambda each: getattr(each, "key", each),
+)
+def test_one_field_changes(exchange: Exchange, field: str) -> None:
+    changed = exchange.apply(SPEC)
+    assert [each.name for each in fields(TrialSpec) if getattr(changed, each.name) != getattr(SPEC, each.name)] == [
+        field
+    ]
+
+
+def test_one_noise_is_off_and_the_other_stays() -> None:
+    assert WithoutLightNoise().apply(SPEC).noise == Noise(0, 20)
+    assert WithoutMotorNoise().apply(SPEC).noise == Noise(8, 0)
+
+
+def test_named_messages_are_not_lost_and_all_other_draws_stay() -> None:
+    channel, safe = Channel(loss=0.4), WithoutMessageLoss(frozenset({3, 5})).apply(SPEC).channel
+    before = [TrialChannel(channel, 1).count_copies(number) for number in range(20)]
+    after = [TrialChannel(replace(channel, never_lost=safe.never_lost), 1).count_copies(number) for number in range(20)]
+    assert 0 in before
+    assert after == [1 if number in (2, 4) else copies for number, copies in enumerate(before)]
+
+
+def test_earlier_answers_are_those_before_the_number_that_reached_the_responder() -> None:
+    messages = talk(("PY::1", "one"), ("PY::2", None), ("PY::3", "three"))
+    lost = Message(9.0, "robot", "PY::4", None, lost="chance")
+    recording = recorded(messages=(*messages, lost))
+    assert collect_earlier_answers(recording, 1) == ()
+    assert collect_earlier_answers(recording, 5) == (
+        EarlierAnswer("one"),
+        EarlierAnswer(None),
+        EarlierAnswer("three"),
+    )
+    doubled = replace(messages[0], note="duplicated")
+    assert collect_earlier_answers(recorded(messages=(doubled, *messages[1:])), 3) is None
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "number"),
+    [
+        ((("a", "1"), ("b", "2")), (("a", "1"), ("b", "2")), None),
+        ((("a", "1"), ("b", "2")), (("a", "1"), ("b", "3")), 2),
+        ((("a", "1"), ("b", None)), (("a", "1"), ("b", "2")), 2),
+        ((("a", "1"),), (("x", "2"),), None),
+        ((("a", 'JSON::{"x": 1, "y": 2}'),), (("a", 'JSON::{"y":2,"x":1}'),), None),
+        ((("a", 'JSON::{"x": 1'),), (("a", 'JSON::{"x":1'),), 1),
+    ],
+)
+def test_first_difference_is_of_answers_to_the_same_texts(
+    own: tuple[tuple[str, str | None], ...], other: tuple[tuple[str, str | None], ...], number: int | None
+) -> None:
+    recordings = recorded(messages=talk(*own)), recorded(messages=talk(*other))
+    assert find_first_difference(*recordings) == number
