@@ -37,14 +37,17 @@ class Channel:
     range: float = 600.0
     facing: float = 90.0
     blocked_by: Literal["obstacles", "nothing"] = "obstacles"
-    never_lost: frozenset[int] = frozenset()  # numbers of texts that chance does not lose, nor their answers
 
 
 class TrialChannel:
-    """The channel of one trial. The random draws for a text depend only on its number."""
+    """The channel of one trial. The random draws for a text depend only on its number.
 
-    def __init__(self, channel: Channel, seed: int) -> None:
+    Texts with the numbers in ``never_lost``, and their answers, are not lost by chance.
+    """
+
+    def __init__(self, channel: Channel, seed: int, never_lost: frozenset[int] = frozenset()) -> None:
         self._channel = channel
+        self._never_lost = never_lost
         self._chance = RandomStream(seed, "channel")
         self._corruption = RandomStream(seed, "corruption")
 
@@ -53,7 +56,7 @@ class TrialChannel:
 
         The draws start at ``index``, so that each direction has its own.
         """
-        if number not in self._channel.never_lost and self._chance.uniform(number, index) < self._channel.loss:
+        if number not in self._never_lost and self._chance.uniform(number, index) < self._channel.loss:
             return 0
         return 2 if self._chance.uniform(number, index + 1) < self._channel.duplication else 1
 

@@ -48,8 +48,15 @@ class _AnswerInTransit:
 class Conversation:
     """All messages of one trial, and the answers in transit. Times are units of simulated time."""
 
-    def __init__(self, channel: Channel, seed: int, chain: HashChain, link: ChannelLink) -> None:
-        self._channel = TrialChannel(channel, seed)
+    def __init__(
+        self,
+        channel: Channel,
+        seed: int,
+        chain: HashChain,
+        link: ChannelLink,
+        never_lost: frozenset[int] = frozenset(),
+    ) -> None:
+        self._channel = TrialChannel(channel, seed, never_lost)
         self._chain = chain
         self.link = link
         self._under_way: list[tuple[int, int, _AnswerInTransit]] = []  # arrival time, message index, content

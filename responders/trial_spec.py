@@ -144,6 +144,7 @@ class TrialSpec:
     number: int = 1  # the robot's number, as its program sees it
     records_lines: bool = True  # whether the recording has the lines of the program, for hints
     noise_seed: int | None = None  # seed of the noise; None: the world's
+    never_lost: frozenset[int] = frozenset()  # numbers of texts that chance does not lose, nor their answers
 
     def build_partner_spec(self, partner: PartnerSpec) -> TrialSpec:
         """Return the trial as the second robot sees it, with its own seeds."""

@@ -16,6 +16,7 @@ from sim.errors import AssignmentError, UsageError
 from sim.floors import HEIGHT, WIDTH
 from sim.recording import Pose
 from submissions.assignment.assignment_parts import build_assignment
+from submissions.assignment.definition import Reruns
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines, find_nearest_line
 from submissions.assignment.reader import find_assignment, read_assignment
@@ -147,6 +148,34 @@ scenarios = ["one"]
     assert isinstance(criterion, Finishes)
     assert (criterion.id, criterion.marks) == ("ends-and-soon", Decimal("0.1"))
     assert assignment.max_marks == Decimal("0.1")
+
+
+BOTH = "[reruns]\n{}\n" + SCENARIO + FINISHES
+
+
+@pytest.mark.parametrize(
+    ("tables", "mistake"),
+    [
+        (BOTH.format('halves = "yes"'), 'halves is "yes", expected true or false'),
+        (BOTH.format("halfs = true"), '"halfs" is not a key of this table, expected "halves" or "reveals"'),
+        (BOTH.format("reveals = -1"), "reveals is -1, expected at least 0"),
+        (BOTH.format("reveals = 2"), "reveals is 2, but every scenario is visible, expected a hidden scenario with it"),
+        (
+            '[parts]\nresponder = "none"\n' + BOTH.format("halves = true"),
+            "halves is true, but students write one part, expected it with two parts from the student",
+        ),
+    ],
+)
+def test_mistakes_in_reruns(tmp_path: Path, tables: str, mistake: str) -> None:
+    (problem,) = problems(tmp_path / "a", HEAD + tables)
+    assert mistake in problem
+
+
+def test_reruns_are_read_and_off_by_default(tmp_path: Path) -> None:
+    assert read_assignment(written(tmp_path / "a", HEAD + SCENARIO + FINISHES)).reruns == Reruns()
+    hidden = SCENARIO + 'visibility = "hidden"\n'
+    text = HEAD + "[reruns]\nhalves = true\nreveals = 3\n" + hidden + FINISHES
+    assert read_assignment(written(tmp_path / "b", text)).reruns == Reruns(halves=True, reveals=3)
 
 
 def test_version_follows_every_file(tmp_path: Path) -> None:

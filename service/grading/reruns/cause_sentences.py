@@ -13,6 +13,7 @@ from service.grading.grade import ShownCause
 from service.grading.reruns.causes import Cause, CauseKind
 from service.grading.reruns.engine import Rerun
 from service.grading.reruns.exchanges import (
+    SECOND_PROGRAM_PART,
     AnswersFrom,
     Exchange,
     GivenPart,
@@ -26,7 +27,11 @@ from service.grading.reruns.exchanges import (
 from service.grading.reruns.halves import decide_losing_parts, find_first_difference
 from service.language import translatable
 from sim.sentences import Sentence, join_sentences, join_with_and
+from submissions.submission import PART_FILES, SECOND_PROGRAM
 
+_FILES: Mapping[str, str] = MappingProxyType(
+    {"program": PART_FILES["program"], "responder": PART_FILES["responder"], SECOND_PROGRAM_PART: SECOND_PROGRAM}
+)
 _EFFECTS: Mapping[str, str] = MappingProxyType(
     {
         "duplication": translatable("no message duplicated"),
@@ -92,7 +97,7 @@ def _describe_part_step(cause: Cause) -> str:
                 "Compare the texts that your program sends and expects with those that your responder expects and "
                 "answers, then submit again."
             )
-    return Sentence("Fix these parts, then submit again: %(parts)s.", parts=join_with_and(losing))
+    return Sentence("Fix these parts, then submit again: %(parts)s.", parts=_join_parts(losing))
 
 
 def describe_result(rerun: Rerun, criterion: str) -> str:
@@ -127,9 +132,9 @@ def _describe_parts(reruns: Sequence[Rerun], criterion: str) -> str:
     result = describe_result(single[part], criterion)
     if len(parts) > 2 or part not in _SINGLE_PARTS:
         sentence: str = Sentence(
-            "With the reference's part %(part)s in place of yours, the rest of your submission %(result)s: this part "
+            "With the reference's %(part)s in place of yours, the rest of your submission %(result)s: this part "
             "loses the marks.",
-            part=part,
+            part=_format_part(part),
             result=result,
         )
     else:
@@ -164,7 +169,7 @@ def _describe_parts_that_still_lose(losing: Sequence[str], parts: Sequence[str])
     if len(losing) > 1:
         return Sentence(
             "With the reference's parts in place of the others, each of these parts still loses marks: %(parts)s.",
-            parts=join_with_and(losing),
+            parts=_join_parts(losing),
         )
     (part,) = losing
     if len(parts) == 2 and part == "program":
@@ -172,7 +177,7 @@ def _describe_parts_that_still_lose(losing: Sequence[str], parts: Sequence[str])
     if len(parts) == 2 and part == "responder":
         return Sentence("With the reference's program in place of yours, your responder still loses marks.")
     return Sentence(
-        "With the reference's parts in place of all others, your part %(part)s still loses marks.", part=part
+        "With the reference's parts in place of all others, your %(part)s still loses marks.", part=_format_part(part)
     )
 
 
@@ -189,7 +194,7 @@ def _describe_misfit(single: Mapping[str, Rerun], losing: Sequence[str], criteri
     return Sentence(
         "With one of these parts of the reference in place of yours, the rest of your submission loses no marks: "
         "%(parts)s.",
-        parts=join_with_and(losing),
+        parts=_join_parts(losing),
     )
 
 
@@ -293,6 +298,15 @@ def _describe_start(reruns: Sequence[Rerun], criterion: str) -> str:
         y=f"{pose.y:g}",
         heading=f"{pose.heading:g}",
     )
+
+
+def _join_parts(parts: Sequence[str]) -> str:
+    return join_with_and([_format_part(part) for part in parts])
+
+
+def _format_part(part: str) -> str:
+    """Return the name of the part's file, under which students know it."""
+    return _FILES.get(part, f"{part}.py")
 
 
 def _get_parts(rerun: Rerun) -> tuple[str, ...]:

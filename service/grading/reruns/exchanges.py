@@ -83,11 +83,9 @@ class WithoutMessageLoss:
 
     def apply(self, spec: TrialSpec) -> TrialSpec:
         """Return the trial with the ingredient replaced."""
-        channel = spec.channel
         if self.numbers is None:
-            return replace(spec, channel=replace(channel, loss=0.0))
-        never_lost = channel.never_lost | {number - 1 for number in self.numbers}
-        return replace(spec, channel=replace(channel, never_lost=never_lost))
+            return replace(spec, channel=replace(spec.channel, loss=0.0))
+        return replace(spec, never_lost=spec.never_lost | {number - 1 for number in self.numbers})
 
 
 @dataclass(frozen=True, slots=True)

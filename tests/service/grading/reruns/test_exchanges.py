@@ -54,7 +54,7 @@ SPEC = TrialSpec(
         (WithoutMotorNoise(), "noise"),
         (OtherNoise(7), "noise_seed"),
         (WithoutMessageLoss(), "channel"),
-        (WithoutMessageLoss(frozenset({3})), "channel"),
+        (WithoutMessageLoss(frozenset({3})), "never_lost"),
         (WithoutChannelEffect("corruption"), "channel"),
         (VisibleStart(Pose(1, 2, 3), 0), "pose"),
         (MoreTime(), "seconds"),
@@ -76,9 +76,9 @@ def test_one_noise_is_off_and_the_other_stays() -> None:
 
 
 def test_named_messages_are_not_lost_and_all_other_draws_stay() -> None:
-    channel, safe = Channel(loss=0.4), WithoutMessageLoss(frozenset({3, 5})).apply(SPEC).channel
+    channel, never_lost = Channel(loss=0.4), WithoutMessageLoss(frozenset({3, 5})).apply(SPEC).never_lost
     before = [TrialChannel(channel, 1).count_copies(number) for number in range(20)]
-    after = [TrialChannel(replace(channel, never_lost=safe.never_lost), 1).count_copies(number) for number in range(20)]
+    after = [TrialChannel(channel, 1, never_lost).count_copies(number) for number in range(20)]
     assert 0 in before
     assert after == [1 if number in (2, 4) else copies for number, copies in enumerate(before)]
 
