@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Literal
@@ -96,6 +96,15 @@ class Submission:
             UsageError: The file is not text.
         """
         return next((self.find_code(name) for name in self.files if find_agent(name, (agent,))), None)
+
+    def with_source(self, file: str, text: str) -> Submission:
+        """Return the submission with another text in one of its Python files: a part, or an additional file."""
+        part = PARTS_BY_FILE.get(file.lower())
+        if part == "program" and self.program is not None:
+            return replace(self, program=SourceFile(self.program.name, text))
+        if part == "responder" and self.responder is not None:
+            return replace(self, responder=SourceFile(self.responder.name, text))
+        return replace(self, files={**self.files, file: text.encode("utf-8", "surrogatepass")})
 
     def files_without(self, agents: Iterable[str]) -> Mapping[str, bytes]:
         """Return the files without those of these agents, which other processes must not read."""

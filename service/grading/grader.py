@@ -76,11 +76,12 @@ def grade(
     observe: ProgressObserver | None = None,
     runner: TrialRunner | None = None,
     extent: PoolExtent = PoolExtent.WHOLE,
+    with_hints: bool = True,
 ) -> Grade:
     """Grade ``submission`` with seeds derived from ``secret``, the secret of the installation.
 
     Without a ``runner``, one is created for this grading and closed afterwards. ``extent`` says how many trials of
-    pools are run.
+    pools are run. Without ``with_hints``, no hints are searched for, which saves time.
 
     Raises:
         UsageError: The submission has none of the parts that the assignment needs.
@@ -89,7 +90,15 @@ def grade(
     """
     if runner is None:
         with TrialRunner() as own_runner:
-            return grade(submission, assignment, secret=secret, observe=observe, runner=own_runner, extent=extent)
+            return grade(
+                submission,
+                assignment,
+                secret=secret,
+                observe=observe,
+                runner=own_runner,
+                extent=extent,
+                with_hints=with_hints,
+            )
     plan = plan_run(submission, assignment, secret)
     runner.start_zygotes(plan.processes)
     trials = tuple(assignment.trials(secret)) if plan.program or not plan.missing else ()
@@ -128,7 +137,7 @@ def grade(
             *build_unjudged_notes(criteria),
         ),
         missing=PART_FILES[plan.missing] if plan.missing else "",
-        hints=collect_hints(submission, plan, results, criteria, meter.heartbeat),
+        hints=collect_hints(submission, plan, results, criteria, meter.heartbeat) if with_hints else (),
         secret_sha256=secret.sha256,
         cost=Cost(meter.limits, meter.spent),
     )

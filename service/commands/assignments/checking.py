@@ -17,6 +17,10 @@ def check(
     write_expected: Annotated[
         bool, typer.Option("--write-expected", help="Add the results of examples without an entry to expected.toml.")
     ] = False,
+    mutants: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, help="Also grade N copies of the reference with one fault each."),
+    ] = 0,
 ) -> None:
     """Find the mistakes in an assignment's files, grade its examples and compare the marks with the expected ones."""
     if everything == (assignment is not None):
@@ -25,4 +29,4 @@ def check(
         raise UsageError("name one assignment to use --write-expected")
     from service.commands.assignments import examples
 
-    examples.check_assignments(assignment, write_expected=write_expected)
+    examples.check_assignments(assignment, write_expected=write_expected, mutant_limit=mutants)

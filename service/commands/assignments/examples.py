@@ -5,29 +5,34 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 from rich.progress import track
 
 from service.commands.assignments.arguments import format_count
 from service.commands.example_tables import build_catalogue_table, build_examples_table, build_measures_table
+from service.commands.mutant_tables import build_catalogue_mutant_tables, build_mutant_tables
 from service.commands.output import create_progress_console, print_json, print_line, print_note, print_renderables
 from service.commands.statistics_tables import build_statistics
 from service.grading.class_statistics import compute_statistics
 from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.trial_runner import TrialRunner
 from service.home import user_permissions
+from service.mutation.mutant_check import MutantCheck, check_mutants
 from sim.errors import AssignmentError
 from submissions.assignment.examples import EXAMPLES, EXPECTED, add_expected
 from submissions.assignment.folder import FILE_NAME, REFERENCE, list_catalogue_ids
 
 
-def check_assignments(assignment: str | None, *, write_expected: bool) -> None:
+def check_assignments(assignment: str | None, *, write_expected: bool, mutant_limit: int = 0) -> None:
     """Check one assignment, or the whole catalogue if ``assignment`` is None.
 
     Args:
         assignment: Catalogue id or folder of the assignment.
         write_expected: Write the results of examples without expectations as their expectations.
+        mutant_limit: The largest number of mutants of each reference to grade.
 
     Raises:
         AssignmentError: Lists everything that differs from the expectations.
@@ -42,12 +47,23 @@ def check_assignments(assignment: str | None, *, write_expected: bool) -> None:
             names = track(list_catalogue_ids(), "grading", transient=True, console=create_progress_console())
             checked_assignments = [check_examples(name, runner=runner) for name in names]
             print_renderables(build_catalogue_table(checked_assignments))
+        mutant_checks = _check_mutants(
+            [assignment] if assignment is not None else list_catalogue_ids(), mutant_limit, runner
+        )
     statistics = compute_statistics(
         example.marked for each in checked_assignments for example in each.examples if example.marked
     )
     if assignment is not None:
         print_renderables(*build_statistics(statistics))
-    print_json(assignments=list(map(_checked_to_json, checked_assignments)), statistics=statistics)
+        print_renderables(*itertools.chain.from_iterable(map(build_mutant_tables, mutant_checks)))
+    elif mutant_checks:
+        print_renderables(*build_catalogue_mutant_tables(mutant_checks))
+    for mutant_check in mutant_checks:
+        _print_mutant_notes(mutant_check)
+    documents = [_checked_to_json(each) for each in checked_assignments]
+    for document, mutant_check in zip(documents, mutant_checks, strict=False):
+        document["mutants"] = _mutants_to_json(mutant_check)
+    print_json(assignments=documents, statistics=statistics)
     for checked_assignment in checked_assignments:
         for warning in checked_assignment.warnings:
             print_note(f"robomark: {checked_assignment.assignment.id}: {warning}")
@@ -57,6 +73,33 @@ def check_assignments(assignment: str | None, *, write_expected: bool) -> None:
     if assignment is None:
         count = sum(len(each.examples) for each in checked_assignments)
         print_line(f"{len(checked_assignments)} assignments, {count} examples: all as expected")
+
+
+def _check_mutants(assignments: Sequence[str], limit: int, runner: TrialRunner) -> list[MutantCheck]:
+    """Return the results of the mutants of each assignment; empty if the limit is 0."""
+    names = track(assignments, "grading mutants", transient=True, console=create_progress_console())
+    return [check_mutants(name, limit, runner=runner) for name in names] if limit else []
+
+
+def _print_mutant_notes(check: MutantCheck) -> None:
+    if check.problem:
+        print_note(f"robomark: {check.assignment}: no mutants were graded: {check.problem}")
+    if check.ungraded:
+        print_note(f"robomark: {check.assignment}: {check.ungraded} mutants were not graded: no CPU time was left")
+
+
+def _mutants_to_json(check: MutantCheck) -> dict[str, Any]:
+    """Return the JSON value for the mutants of an assignment."""
+    return {
+        "operators": check.counts,
+        "ungraded": check.ungraded,
+        "survivors": [
+            {"operator": each.mutant.operator, "file": each.mutant.file, "line": each.mutant.line,
+             "old": each.mutant.old, "new": each.mutant.new}
+            for each in check.survivors
+        ],
+        "problem": check.problem,
+    }  # fmt: skip
 
 
 def _checked_to_json(checked: CheckedAssignment) -> dict[str, Any]:
