@@ -12,14 +12,17 @@ from rich.text import Text
 
 from service.commands.output import create_table
 from service.grading.example_check import CheckedAssignment, ComparedMeasure, ExampleResult
+from service.grading.no_effort import NOTABLE_SHARE
 from service.reports.display_text import format_decimal, to_one_line
 from submissions.assignment.folder import REFERENCE
 
 
 def build_catalogue_table(checked_assignments: Iterable[CheckedAssignment]) -> Table:
     """Return a table with a row for each assignment: marks of the reference and wrong solutions, time, measures."""
-    numbers = ("of", REFERENCE, "s")
-    table = create_table("section", "assignment", "of", REFERENCE, "others", "s", "measures (original)", right=numbers)
+    numbers = ("of", REFERENCE, "no effort", "s")
+    table = create_table(
+        "section", "assignment", "of", REFERENCE, "others", "no effort", "s", "measures (original)", right=numbers
+    )
     for checked_assignment in checked_assignments:
         table.add_row(
             checked_assignment.assignment.section,
@@ -31,6 +34,7 @@ def build_catalogue_table(checked_assignments: Iterable[CheckedAssignment]) -> T
             " ".join(
                 _format_example_marks(example) for example in checked_assignment.examples if example.name != REFERENCE
             ),
+            _format_share(max((each.share for each in checked_assignment.no_effort), default=0.0)),
             f"{sum(example.seconds for example in checked_assignment.examples):.1f}",
             "; ".join(map(_format_measure, checked_assignment.measures)),
         )
@@ -51,6 +55,15 @@ def build_examples_table(checked: CheckedAssignment) -> Table:
     return table
 
 
+def build_no_effort_table(checked: CheckedAssignment) -> Table:
+    """Return a table with the marks of each submission without effort."""
+    table = create_table("without effort", "marks", "share", right=("marks", "share"))
+    for result in checked.no_effort:
+        marks = "refused" if result.marks is None else format_decimal(result.marks)
+        table.add_row(result.description, marks, _format_share(result.share))
+    return table
+
+
 def build_measures_table(checked: CheckedAssignment) -> Table:
     """Return a table that compares the reference's measures with those of the original simulator."""
     table = create_table("measure", "here", "original", "unit", "", right=("here", "original"))
@@ -68,6 +81,11 @@ def build_measures_table(checked: CheckedAssignment) -> Table:
 def _format_example_marks(example: ExampleResult) -> str:
     marks = "refused" if example.marks is None else format_decimal(example.marks)
     return f"{marks}!" if example.problems else marks
+
+
+def _format_share(share: float) -> Text:
+    """Return the share in percent; red if the assignment should be changed."""
+    return Text(f"{share:.0%}", style="red" if share >= NOTABLE_SHARE else "")
 
 
 def _format_measure(measure: ComparedMeasure) -> str:

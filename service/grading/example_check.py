@@ -16,6 +16,7 @@ from service.grading.grade import Grade
 from service.grading.grader import grade
 from service.grading.guessable_reports import find_guessable_reports
 from service.grading.judging.message_parts import describe_fault
+from service.grading.no_effort import NoEffortResult
 from service.grading.trial_runner import TrialRunner
 from sim.errors import UsageError
 from sim.recording_values import collect_faults
@@ -65,11 +66,12 @@ class ComparedMeasure:
 
 @dataclass(frozen=True, slots=True)
 class CheckedAssignment:
-    """The results of all examples of an assignment, the reference first."""
+    """The results of all examples of an assignment, the reference first, and of submissions without effort."""
 
     assignment: Assignment
     examples: tuple[ExampleResult, ...]
     measures: tuple[ComparedMeasure, ...]
+    no_effort: tuple[NoEffortResult, ...] = ()  # empty if they were not graded
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -80,8 +82,9 @@ class CheckedAssignment:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence for each setting that is allowed but makes marks easy to guess."""
-        return tuple(find_guessable_reports(self.assignment))
+        """One sentence for each setting that is allowed but makes marks easy to guess, or gives many without effort."""
+        notable_results = (result for result in self.no_effort if result.is_notable)
+        return (*find_guessable_reports(self.assignment), *map(_describe_no_effort, notable_results))
 
     @property
     def missing_expectations(self) -> Mapping[str, ExpectedResult]:
@@ -242,4 +245,11 @@ def _check_measure(measure: ComparedMeasure) -> tuple[str, ...]:
     return (
         f"{REFERENCE}: {original.measure} is {measure.value:g} {measure.unit}".rstrip()
         + f", expected {original.value:g} within {original.within:.0%}, or an explanation",
+    )
+
+
+def _describe_no_effort(result: NoEffortResult) -> str:
+    return (
+        f"{result.description} gets {result.marks} of {result.max_marks} marks; "
+        "give most marks to what the task is about, and the others only with it (needs)"
     )

@@ -57,6 +57,7 @@ def read_criteria(
     for table_path, criterion in criteria.items():
         for requirement in (
             *_find_missing_parts(criterion, context, is_robotless),
+            *_find_needs_mistakes(criterion, context),
             *criterion.find_unmet_requirements(context),
             *find_pool_mistakes(criterion, context),
         ):
@@ -126,6 +127,34 @@ def _find_missing_parts(
             'check judges a run of the robot, but there is no scenario and parts has program = "none", '
             f"expected {join_with_or(_WITHOUT_ROBOT)}",
         )
+
+
+def _find_needs_mistakes(criterion: Criterion, context: AssignmentContext) -> Iterator[UnmetRequirement]:
+    """Yield why the criterion cannot need another: that one must exist, give marks, and be no secret nor need it."""
+    if criterion.needs is None:
+        return
+    if criterion.result_needed != criterion.needs:
+        yield UnmetRequirement("needs", "needs is not used with a ranking, which needs the criterion that it ranks")
+        return
+    criteria_by_id = {each.id: each for each in context.criteria if each.marks and each.id != criterion.id}
+    needed_criterion = criteria_by_id.get(criterion.needs)
+    if needed_criterion is None:
+        hint = suggest_name(criterion.needs, criteria_by_id)
+        yield UnmetRequirement(
+            "needs", f'needs is "{criterion.needs[:60]}", expected the id of another criterion with marks{hint}'
+        )
+        return
+    if needed_criterion.visibility not in ("visible", criterion.visibility):
+        # The lost marks would reveal the result.
+        yield UnmetRequirement(
+            "needs", f'needs is "{criterion.needs}", which students do not see, expected one with the same visibility'
+        )
+    needed_ids = {each.id: each.result_needed for each in context.criteria}
+    name: str | None = criterion.needs
+    for _ in needed_ids:
+        name = needed_ids.get(name) if name is not None else None
+    if name is not None:
+        yield UnmetRequirement("needs", f'needs is "{criterion.needs}", which leads in a circle, expected none')
 
 
 def _make_slug(title: str) -> str:

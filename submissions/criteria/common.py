@@ -81,6 +81,8 @@ def _remove_padding(marks: Decimal) -> Decimal:
 class Criterion(StrictTable):
     """Base class of all criteria. ``scenarios`` names the scenarios it applies to; empty means all.
 
+    With ``needs``, the id of another criterion, it gets marks only if that one gets at least half of its marks.
+
     A kind of criterion is a subclass with ``check: Literal["its name"]``.
     """
 
@@ -93,6 +95,7 @@ class Criterion(StrictTable):
     #: how trials are converted to marks
     over: Literal["share", "all", "mean", "median", "worst"] = "share"
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible"
+    needs: str | None = Field(default=None, min_length=1, max_length=80)
     #: [share, marks]: the marks from a share of the pool on, for a scenario with a pool
     bands: tuple[Annotated[tuple[float, float], Entries("[share, marks]")], ...] = ()
 
@@ -123,7 +126,7 @@ class Criterion(StrictTable):
     @property
     def result_needed(self) -> str | None:
         """The id of the criterion that must be judged first."""
-        return None
+        return self.needs
 
     def can_measure(self, name: str) -> bool:
         """Return whether it measures a value with this name."""

@@ -18,11 +18,18 @@ from submissions.criteria.common import (
     Texts,
     UnmetRequirement,
 )
-from submissions.criteria.places import Zone
+from submissions.criteria.places import Range, Zone
 from submissions.strict_table import StrictTable
 
 Source = Literal["print", "speech", "either"]
 _MAX_LABEL_TOLERANCE = 0.49  # less than half of the distance between the numbers of two labels
+
+
+class Reading(StrictTable):
+    """A reading of a light sensor: its reflected light in percent, [least, most]."""
+
+    light: Literal["left", "right"] = "left"
+    reflected: Range
 
 
 class Reports(CriterionWithStrays):
@@ -42,6 +49,8 @@ class Reports(CriterionWithStrays):
       these poses have the same answer.
     - With ``only``, no other number may be reported.
 
+    Only reports in ``zone`` (of the left light sensor) and from the first reading ``after`` on count, if given.
+
     ``expected = "label"`` is the floor's label under the left light sensor at the start. Any other label of the floor
     is wrong, as with ``among``.
     """
@@ -53,6 +62,8 @@ class Reports(CriterionWithStrays):
     tolerance: float = Field(default=0.5, ge=0)
     among: Annotated[Texts, NotBlank] = ()
     only: bool = False
+    zone: Zone | None = None
+    after: Reading | None = None
 
     @property
     def asks_responder(self) -> bool:

@@ -22,7 +22,7 @@ def check(
         typer.Option(metavar="N", min=0, help="Also grade N copies of the reference with one fault each."),
     ] = 0,
 ) -> None:
-    """Find the mistakes in an assignment's files, grade its examples and compare the marks with the expected ones."""
+    """Find the mistakes in an assignment's files, and grade its examples and submissions without effort."""
     if everything == (assignment is not None):
         raise UsageError("name one assignment to check, or use --all for the whole catalogue")
     if everything and write_expected:

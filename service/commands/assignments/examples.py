@@ -1,23 +1,31 @@
-"""Grade the examples of one assignment or of the whole catalogue, and compare the results with the expected ones.
+"""Grade the examples of one assignment or of the whole catalogue, and submissions without effort.
 
-``grading/example_check.py`` does the grading.
+``grading/example_check.py`` compares the examples with the expected results. ``grading/no_effort.py`` has the
+submissions without effort.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from rich.progress import track
 
 from service.commands.assignments.arguments import format_count
-from service.commands.example_tables import build_catalogue_table, build_examples_table, build_measures_table
+from service.commands.example_tables import (
+    build_catalogue_table,
+    build_examples_table,
+    build_measures_table,
+    build_no_effort_table,
+)
 from service.commands.mutant_tables import build_catalogue_mutant_tables, build_mutant_tables
 from service.commands.output import create_progress_console, print_json, print_line, print_note, print_renderables
 from service.commands.statistics_tables import build_statistics
 from service.grading.class_statistics import compute_statistics
 from service.grading.example_check import CheckedAssignment, check_examples
+from service.grading.no_effort import grade_without_effort
 from service.grading.trial_runner import TrialRunner
 from service.home import user_permissions
 from service.mutation.mutant_check import MutantCheck, check_mutants
@@ -39,13 +47,13 @@ def check_assignments(assignment: str | None, *, write_expected: bool, mutant_li
     """
     with TrialRunner() as runner:
         if assignment is not None:
-            checked_assignments = [check_examples(assignment, runner=runner)]
+            checked_assignments = [_check_assignment(assignment, runner)]
             if write_expected:
                 checked_assignments = [_write_expectations(assignment, checked_assignments[0])]
             _show_checked(checked_assignments[0])
         else:
             names = track(list_catalogue_ids(), "grading", transient=True, console=create_progress_console())
-            checked_assignments = [check_examples(name, runner=runner) for name in names]
+            checked_assignments = [_check_assignment(name, runner) for name in names]
             print_renderables(build_catalogue_table(checked_assignments))
         mutant_checks = _check_mutants(
             [assignment] if assignment is not None else list_catalogue_ids(), mutant_limit, runner
@@ -73,6 +81,11 @@ def check_assignments(assignment: str | None, *, write_expected: bool, mutant_li
     if assignment is None:
         count = sum(len(each.examples) for each in checked_assignments)
         print_line(f"{len(checked_assignments)} assignments, {count} examples: all as expected")
+
+
+def _check_assignment(name: str, runner: TrialRunner) -> CheckedAssignment:
+    checked = check_examples(name, runner=runner)
+    return replace(checked, no_effort=grade_without_effort(name, checked.assignment, runner=runner))
 
 
 def _check_mutants(assignments: Sequence[str], limit: int, runner: TrialRunner) -> list[MutantCheck]:
@@ -118,6 +131,10 @@ def _checked_to_json(checked: CheckedAssignment) -> dict[str, Any]:
              "unit": each.unit, "agrees": each.is_close}
             for each in checked.measures
         ],
+        "no_effort": [
+            {"name": each.name, "marks": each.marks, "share": round(each.share, 4), "problem": each.problem}
+            for each in checked.no_effort
+        ],
         "problems": checked.problems,
         "warnings": checked.warnings,
     }  # fmt: skip
@@ -150,3 +167,4 @@ def _show_checked(checked: CheckedAssignment) -> None:
         print_line(f"no examples to grade: expected {EXAMPLES}/{REFERENCE} beside {FILE_NAME}")
     if checked.measures:
         print_renderables(build_measures_table(checked))
+    print_renderables(build_no_effort_table(checked))

@@ -6,6 +6,8 @@ The judge of a criterion is in the module with the same name as the module of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from decimal import Decimal
 from importlib import import_module
 from types import MappingProxyType
 
@@ -14,7 +16,7 @@ from service.grading.judging.judge_declaration import Case, Judge, StaticAnalysi
 from service.grading.judging.outcome import fail_with
 from sim.errors import HostError
 from sim.recording import Verdict
-from sim.sentences import Sentence
+from sim.sentences import Sentence, join_sentences
 from submissions.assignment.definition import Assignment
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import PART_FILES
@@ -63,8 +65,16 @@ def reject_failed_trials(trials: Sequence[TrialResult]) -> None:
 
 
 def order_criteria(assignment: Assignment) -> list[Criterion]:
-    """Return the criteria in judging order: those that use the result of another come last."""
-    return sorted(assignment.criteria, key=lambda each: each.result_needed is not None)
+    """Return the criteria in judging order: those that use the result of another come after it."""
+    needed_ids = {each.id: each.result_needed for each in assignment.criteria}
+
+    def count_needed(criterion: Criterion) -> int:
+        count, name = 0, criterion.result_needed
+        while name is not None and count < len(needed_ids):
+            count, name = count + 1, needed_ids.get(name)
+        return count
+
+    return sorted(assignment.criteria, key=count_needed)
 
 
 def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
@@ -72,4 +82,17 @@ def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
     missing_part = case.analysis.missing
     if missing_part in criterion.parts_needed:
         return judge_once(criterion, fail_with(Sentence("There is no %(file)s.", file=PART_FILES[missing_part])))
-    return JUDGES[type(criterion)].judge(criterion, case)
+    result = JUDGES[type(criterion)].judge(criterion, case)
+    needed_result = case.results.get(criterion.needs) if criterion.needs is not None else None
+    if needed_result is None or not result.marks or 2 * needed_result.marks >= needed_result.max_marks:
+        return result
+    return _withhold_marks(result, needed_result)
+
+
+def _withhold_marks(result: CriterionResult, needed_result: CriterionResult) -> CriterionResult:
+    """Return the result without marks, because the criterion that it needs has less than half of its own."""
+    reason = Sentence(
+        'This gives no marks, because "%(title)s" has less than half of its marks.', title=needed_result.title
+    )
+    shown = result.shown and replace(result.shown, message=join_sentences(result.shown.message, reason))
+    return replace(result, marks=Decimal("0.00"), message=join_sentences(result.message, reason), shown=shown)

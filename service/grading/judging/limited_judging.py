@@ -190,9 +190,9 @@ class _JudgingProcess:
             yield _pickle_result(result, self.case.trials)
 
     def _judge_criterion(self, criterion: Criterion) -> CriterionResult:
-        ranked_result = self.results.get(criterion.result_needed or "")
-        if ranked_result is not None and ranked_result.unjudged:
-            cause = Sentence("%(criterion)s, which it ranks, could not be judged", criterion=ranked_result.id)
+        needed_result = self.results.get(criterion.result_needed or "")
+        if needed_result is not None and needed_result.unjudged:
+            cause = Sentence("%(criterion)s, which it needs, could not be judged", criterion=needed_result.id)
             return _build_unjudged_result(criterion, cause)
         try:
             return judge_one(criterion, self.case)

@@ -16,6 +16,7 @@ from service.grading.judging.geometry import describe_zone, is_in_zone, locate_p
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.report_places import describe_uncounted_report, select_counting_lines
 from service.grading.judging.report_rows import Entry, ReportTokens, Row, can_match_row, is_equivalent_row, is_near
 from service.grading.judging.report_sentences import (
     describe_expectation,
@@ -60,7 +61,11 @@ NO_LABEL = "nothing"
 def judge_reports(criterion: Reports, trial: TrialResult) -> Outcome:
     """Judge a report by searching for the entries of the trial's pose, in order."""
     answer_row = _find_expected_row(criterion, trial)
-    lines = _collect_texts(criterion, trial.recording)
+    all_lines = _collect_texts(criterion, trial.recording)
+    lines = select_counting_lines(criterion, all_lines, trial.recording)
+    if all_lines and not lines:
+        entries = describe_expected_entries(criterion, answer_row)
+        return fail_with(describe_uncounted_report(criterion, describe_expectation(criterion, entries)))
     timed_tokens = [(token, line.t) for line in lines for token in tokenize_text(line.text)]
     rows = _collect_rows(criterion, trial.recording)
     outcome = _judge_report(

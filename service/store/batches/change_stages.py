@@ -97,8 +97,9 @@ def compare_versions(before: Assignment, after: Assignment) -> VersionDifference
     """Return the difference between two versions. Titles, descriptions and the visibility of criteria do not count."""
     old_tables, new_tables = _dump_criteria(before), _dump_criteria(after)
     changed = {name for name in {**old_tables, **new_tables} if old_tables.get(name) != new_tables.get(name)}
-    # A criterion that ranks the result of another changes with it.
-    changed |= {each.id for each in after.criteria if each.result_needed in changed}
+    # A criterion that uses the result of another changes with it. They may be in a row.
+    for _ in after.criteria:
+        changed |= {each.id for each in after.criteria if each.result_needed in changed}
     shared_parts = tuple(name for name in _SHARED_PARTS if getattr(before, name) != getattr(after, name))
     old_scenarios, new_scenarios = _list_scenarios(before), _list_scenarios(after)
     all_scenarios = {**old_scenarios, **new_scenarios}

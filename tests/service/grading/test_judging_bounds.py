@@ -375,7 +375,7 @@ def test_a_rank_of_what_could_not_be_judged_is_not_judged_either(monkeypatch: py
     _spoil(monkeypatch, {"lap": _raises})
     ranked, _ = judge_within_limits(_SMALL, _asking(rank, lap), _trials(_LITTLE), StaticAnalysis())
     assert ranked.marks == 0
-    assert ranked.unjudged == "lap, which it ranks, could not be judged"
+    assert ranked.unjudged == "lap, which it needs, could not be judged"
 
 
 def test_what_comes_back_is_what_was_judged(monkeypatch: pytest.MonkeyPatch) -> None:
