@@ -50,6 +50,7 @@ class FaultKind(Enum):
     INDENTATION_ERROR = r"^IndentationError"
     NO_BLOCK = r"^IndentationError: expected an indented block after .{1,60}? on line (\d+)"  # line of the block's head
     UNCLOSED_TEXT = r"^SyntaxError: unterminated (triple-quoted )?(?:f-)?string literal"  # empty with single quotes
+    OPEN_BRACE = r"^SyntaxError: f-string: expecting '}'"
     #: Functions of the student that Robomark calls.
     MISSING_FUNCTION = r"there is no function called (\w+)"  # function
     NO_RETURN = r"TypeError: (\w+) returned NoneType, which has no \w+"  # function

@@ -73,7 +73,9 @@ _TEXT = re.compile(r"""(["'])((?:(?!\1).){1,200})\1""")
 _VALUES = re.compile(r"(?:, got 1D array instead)?:?\s*\n.*|array=.*|: line \d+ column \d+ \(char \d+\)", re.DOTALL)
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
 #: A guess by Python that better advice replaces.
-_COMMA_GUESS = re.compile(r"\. Perhaps you forgot a comma\?$")
+_COMMA_GUESS = re.compile(
+    r"\. Perhaps you forgot a comma\?$|(?<=literal) here\. Maybe you meant '==' instead of '='\?$"
+)
 #: The list of available modules in a message about a missing module.
 _MODULES = re.compile(r"(?<='): numpy, .* are there$")
 _NEAR_KEY, _NEAR_MODULE = 0.6, 0.8

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, is_name
+from service.grading.hint_foreign_syntax import advise_on_foreign_syntax
 from service.grading.hint_tables import ACTIONS
 from sim.recording import Fault
 from sim.sentences import Sentence
@@ -36,7 +37,8 @@ _UNBRACKETED_CALL = re.compile(
 )
 #: Misspelt comparison signs that are no Python, with the right ones.
 _SIGNS = {"=>": ">=", "=<": "<=", "=!": "!=", "<>": "!=", "> =": ">=", "< =": "<=", "! =": "!=", "= =": "=="}
-_SIGN = re.compile(r"=>|=<|=!(?!=)|<>|[<>!=] =")
+_SIGNS |= {f"{sign} =": f"{sign}=" for sign in "+-*/"}
+_SIGN = re.compile(r"=>|=<|=!(?!=)|<>|[<>!=] =|(?<=[\w\])] )[-+*/] =")
 _NUMBER_WITH_UNIT = re.compile(
     r"\b(\d+(?:\.\d+)?)[ ]*(%|°|cm|mm|ms|s|sec|seconds?|deg|degrees?|rotations?)[ ]*(?=[,)]|$)"
 )
@@ -58,6 +60,7 @@ def advise_on_syntax(fault: Fault, _: Clues, listing: Listing | None, __: Statem
         or _advise_on_unclosed_text(fault, line)
         or _advise_on_call_without_brackets(line)
         or _advise_on_comparison_sign(line)
+        or advise_on_foreign_syntax(fault, listing, line)
         or _advise_on_unit(line)
         or _advise_on_unquoted_prefix(line)
         or _advise_on_unquoted_words(line, listing)
