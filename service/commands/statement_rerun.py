@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 
 from service.grading.grade import Grade, TrialResult
@@ -10,7 +9,7 @@ from service.grading.grader import grade as grade_submission
 from service.grading.pools.drawing import PoolExtent
 from service.statements.facts import FactKind
 from service.statements.statement import Statement
-from service.statements.statement_check import Check, collect_values
+from service.statements.statement_check import Check, collect_values, format_value
 from service.statements.statement_file import StatementFile
 from service.statements.tick_columns import find_difference
 from service.version import GRADER_VERSION, hash_grader
@@ -69,13 +68,15 @@ def _describe_first(file: StatementFile, number: int, trial: TrialResult) -> str
 
 
 def _find_marks_differences(file: StatementFile, grade: Grade) -> Iterator[str]:
-    """Yield the criteria whose marks differ, without those that staff set."""
-    criteria = {result.id: result for result in grade.criteria}
-    stated_criteria = (collect_values(file, kind).values() for kind in (FactKind.CRITERION, FactKind.HIDDEN_CRITERION))
-    for stated in itertools.chain.from_iterable(stated_criteria):
-        result = criteria.get(stated.get("id"))
-        if stated.get("set_by_staff") or result is None:
-            continue
+    """Yield the criteria whose marks differ or are on one side only. Marks that staff set are not compared."""
+    kinds = (FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
+    stated_criteria = {str(value.get("id")): value for kind in kinds for value in collect_values(file, kind).values()}
+    for result in grade.criteria:
+        stated = stated_criteria.pop(result.id, None)
         marks = f"{result.marks.normalize():f}"
-        if marks != stated.get("marks"):
-            yield f"{result.title}: {stated.get('marks')} marks stated, {marks} now"
+        if stated is None:
+            yield f"{result.title}: no marks stated, {marks} now"
+        elif not stated.get("set_by_staff") and marks != stated.get("marks"):
+            yield f"{result.title}: {format_value(stated.get('marks'))} marks stated, {marks} now"
+    for stated in stated_criteria.values():
+        yield f"{format_value(stated.get('title'))}: {format_value(stated.get('marks'))} marks stated, none now"

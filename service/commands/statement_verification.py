@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from service.statements.statement_check import (
     check_statement,
     check_submission,
     collect_values,
+    format_value,
 )
 from service.statements.statement_file import MAX_FILE_BYTES, StatementFile, parse_statement_file
 from sim.errors import HostError, UsageError
@@ -83,23 +84,25 @@ def _describe(file: StatementFile, checked: CheckedStatement) -> list[str]:
     predicate = checked.statement.predicate
     names = ("change", "course", "student", "attempt", "submitted_at", "published_at", "issued_at", "grade")
     lines = [
-        f"{name.replace('_', ' ')}: {_shorten(predicate[name])}" for name in names if predicate.get(name) is not None
+        f"{name.replace('_', ' ')}: {format_value(predicate[name])}"
+        for name in names
+        if predicate.get(name) is not None
     ]
     assignment = predicate.get("assignment")
     if isinstance(assignment, dict):
-        lines.append(f"assignment: {_shorten(assignment.get('id'))}, version {_shorten(assignment.get('version'))}")
+        lines.append(
+            f"assignment: {format_value(assignment.get('id'))}, version {format_value(assignment.get('version'))}"
+        )
     for value in collect_values(file, FactKind.CRITERION).values():
-        lines.append(f"{_shorten(value.get('title'))}: {value.get('marks')} of {value.get('max_marks')}")
+        lines.append(f"{format_value(value.get('title'))}: {_format_marks(value)}")
     for value in collect_values(file, FactKind.TOTAL).values():
         status = ", provisional" if value.get("provisional") else ""
-        lines.append(f"total: {value.get('marks')} of {value.get('max_marks')}{status}")
+        lines.append(f"total: {_format_marks(value)}{status}")
     return lines
 
 
-def _shorten(value: Any) -> str:
-    """Return a value of a file in one printable line."""
-    text = "".join(character if character.isprintable() else "?" for character in str(value))
-    return text if len(text) <= 120 else f"{text[:117]}..."
+def _format_marks(value: Mapping[str, Any]) -> str:
+    return f"{format_value(value.get('marks'))} of {format_value(value.get('max_marks'))}"
 
 
 def _check_against_files(

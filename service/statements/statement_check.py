@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from typing import Any
 
 from service.statements.envelopes import Envelope
@@ -15,6 +15,8 @@ from service.statements.statement import PredicateType, Statement, parse_stateme
 from service.statements.statement_file import LogPlace, StatementFile
 from sim.errors import UsageError
 from submissions.submission import Submission
+
+_MAX_VALUE_LENGTH = 121
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,12 @@ def check_submission(statement: Statement, submission: Submission) -> Check:
 def collect_values(file: StatementFile, kind: FactKind) -> dict[int, Any]:
     """Return the values of the file's facts of one kind, by number."""
     return {each.fact.number: each.fact.value for each in file.facts if each.fact.kind is kind}
+
+
+def format_value(value: Any) -> str:
+    """Return a value of a file in one printable line of at most 120 characters."""
+    text = "".join(character if character.isprintable() else "?" for character in str(value)[:_MAX_VALUE_LENGTH])
+    return text if len(text) < _MAX_VALUE_LENGTH else f"{text[: _MAX_VALUE_LENGTH - 4]}..."
 
 
 def _check_signature(envelope: Envelope, keys: Collection[PublicKey], *, is_trusted: bool) -> Check:
@@ -134,7 +142,7 @@ def _check_total(file: StatementFile, commitments: Any) -> Iterator[Check]:
     try:
         marks = sum((Decimal(each["marks"]) for each in (*criteria.values(), *hidden.values())), Decimal(0))
         is_sum = marks == Decimal(total["marks"])
-    except (KeyError, TypeError, ValueError, InvalidOperation):
+    except (KeyError, TypeError, ValueError, ArithmeticError):
         is_sum = False
     yield Check(
         is_sum, "the total is the sum of the criteria" if is_sum else "the total is not the sum of the criteria"

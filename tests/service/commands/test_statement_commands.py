@@ -18,8 +18,11 @@ from service.commands import statement_rerun
 from service.commands.statement_verification import VerificationOptions, verify_file
 from service.grading.grader import grade
 from service.operations import statements
+from service.statements.facts import Fact, FactKind, commit_to_facts, open_fact
+from service.statements.keys import generate_signing_key
 from service.statements.keys_document import dump_keys
-from service.statements.statement_file import parse_statement_file
+from service.statements.statement import PredicateType, sign_statement
+from service.statements.statement_file import LogPlace, StatementFile, parse_statement_file
 from service.store.batches.intake import accept_batch
 from service.store.grades import results
 from service.store.installation import load_secret
@@ -105,6 +108,31 @@ def test_other_marks_are_named(home: Path, capsys: pytest.CaptureFixture[str], m
     with pytest.raises(HostError):
         verify_file(home / "statement.json", _options(home))
     assert "marks stated, " in capsys.readouterr().out
+
+
+def test_marks_that_the_file_leaves_out_are_named(
+    home: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = parse_statement_file((home / "statement.json").read_bytes())
+    trials = tuple(each for each in file.facts if each.fact.kind is FactKind.TRIAL)
+    (tmp_path / "statement.json").write_bytes(replace(file, facts=trials).to_bytes())
+    with pytest.raises(HostError):
+        verify_file(tmp_path / "statement.json", _options(home))
+    assert ": no marks stated, " in capsys.readouterr().out
+
+
+def test_values_of_a_file_are_printed_without_control_characters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    key, marks = generate_signing_key(), "9\x1b[2K\nok     forged"
+    fact = open_fact(Fact(FactKind.CRITERION, 1, {"id": ["a"], "title": "A", "marks": marks}), bytes(32))
+    predicate = {"entry": 0, "commitments": commit_to_facts([fact])}
+    envelope = sign_statement(key, PredicateType.GRADE, {"submission": "ab" * 32}, predicate)
+    root = {"log": envelope.hash_as_leaf(bytes(32)).hex()}
+    place = LogPlace("00" * 32, (), sign_statement(key, PredicateType.LOG_HEAD, root, {"size": 1}))
+    (tmp_path / "own.json").write_bytes(StatementFile(envelope, (key.public_key,), place, (fact,)).to_bytes())
+    verify_file(tmp_path / "own.json", VerificationOptions(None, None, None))
+    assert "A: 9?[2K?ok     forged of None\n" in capsys.readouterr().out
 
 
 def test_the_wrong_files_are_refused(home: Path, tmp_path: Path) -> None:

@@ -153,6 +153,19 @@ def test_a_predicate_with_parts_of_other_types_is_refused(predicate: Any) -> Non
         check_statement(StatementFile(envelope, (OTHER_KEY.public_key,)), [])
 
 
+@pytest.mark.parametrize("marks", ["9e999999999999999999", "NaN", "sNaN", [0, [1], 0], None])
+def test_a_total_of_marks_that_cannot_be_added_fails(marks: Any) -> None:
+    facts = tuple(
+        open_fact(Fact(kind, number, {"marks": marks}), OPENING_KEY)
+        for kind, number in [(FactKind.TOTAL, 1), (FactKind.CRITERION, 1), (FactKind.CRITERION, 2)]
+    )
+    envelope = sign_statement(KEY, PredicateType.GRADE, {}, {"entry": 0, "commitments": commit_to_facts(facts)})
+    root = {"log": envelope.hash_as_leaf(bytes(32)).hex()}
+    place = LogPlace("00" * 32, (), sign_statement(KEY, PredicateType.LOG_HEAD, root, {"size": 1}))
+    file = StatementFile(envelope, (KEY.public_key,), place, facts)
+    assert _find_failures(file) == ["the total is not the sum of the criteria"]
+
+
 def test_facts_and_roots_of_other_types_are_refused() -> None:
     document = json.loads(_build_file().to_bytes())
     document["facts"][0]["value"] = "x"
