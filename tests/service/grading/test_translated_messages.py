@@ -76,6 +76,7 @@ def _assert_translatable(sentence: str, extracted_templates: frozenset[str]) -> 
         ("replies", {"to_starts_with": "PY::", "at_least": 2}, {"messages": (*talk(("PY::a", "z")), _LOST)}),
         ("resends", {"every": [0.5, 2], "at_most": 3}, {"messages": talk(("PY::a", None))}),
         ("in_reach", {"at_least": 1}, {"messages": (_LOST,)}),
+        ("conduct", {}, {"messages": talk(("PY::a", "JSON::{"))}),
         ("reports", {"expected": [[5, "a"]], "tolerance": 2}, {"printed": lines("7 b")}),
         ("datalog", {"series": "L", "measured": "gyro"}, {"datalog": (DatalogEntry(1.0, "L", 77.0, None),)}),
         ("datalog", {"series": "L", "covers": [1, 2]}, {"datalog": (DatalogEntry(1.0, "L", 77.0, None),)}),
