@@ -228,12 +228,16 @@ class TrialResult:
 
 @dataclass(frozen=True, slots=True)
 class ShownCause:
-    """Why a criterion lost marks, as reruns showed it: sentences, the next step, and whether only staff see it."""
+    """Why a criterion lost marks, as reruns showed it: sentences, the next step, and whether only staff see it.
+
+    ``files`` are those of the parts that lose the marks, if reruns showed them.
+    """
 
     criterion: str
     text: str
     next_step: str
     for_staff: bool = False
+    files: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

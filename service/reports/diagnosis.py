@@ -26,7 +26,7 @@ from service.reports.verdict_sentences import (
 )
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
-from submissions.submission import Submission
+from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
 
 _PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
 _QUOTED = re.compile(r'"([^"]{2,})"')
@@ -79,7 +79,7 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     Excerpts need the ``submission``. If reruns showed the cause, their proof is added, and its next step replaces the
     general one.
     """
-    diagnosis = _diagnose_recorded_trials(grade, submission, language)
+    diagnosis = _diagnose_recorded_trials(_drop_refuted_hints(grade), submission, language)
     indices = {result.id: index for index, result in enumerate(grade.criteria) if result.marks < result.max_marks}
     causes = [each for each in grade.causes if each.criterion in indices]
     if not causes:
@@ -92,6 +92,16 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
         proof=format_proof(cause),
         proven=indices[cause.criterion],
     )
+
+
+def _drop_refuted_hints(grade: Grade) -> Grade:
+    """Return the grade without hints about a part that loses no marks, according to reruns."""
+    losing_files = {file for cause in grade.causes for file in cause.files}
+    if not losing_files or any(not cause.files for cause in grade.causes):
+        return grade
+    innocent_files = {*PART_FILES.values(), SECOND_PROGRAM} - losing_files
+    hints = (hint for hint in grade.hints if (place := _PLACE.match(hint)) is None or place[2] not in innocent_files)
+    return replace(grade, hints=tuple(hints))
 
 
 def _rank_cause(grade: Grade, index: int, diagnosis: Diagnosis) -> tuple[bool, Decimal, int]:

@@ -56,7 +56,13 @@ def build_shown_causes(causes: Sequence[Cause], reveals: int = 0) -> tuple[Shown
             text = join_sentences(Sentence("In a hidden trial:"), text)
             revealed_count += 1
         shown_causes.append(
-            ShownCause(criterion, text, describe_next_step(group[0]), is_hidden and revealed_count > reveals)
+            ShownCause(
+                criterion,
+                text,
+                describe_next_step(group[0]),
+                is_hidden and revealed_count > reveals,
+                _list_losing_files(group[0]),
+            )
         )
     return tuple(shown_causes)
 
@@ -97,7 +103,17 @@ def _describe_part_step(cause: Cause) -> str:
                 "Compare the texts that your program sends and expects with those that your responder expects and "
                 "answers, then submit again."
             )
+    if len(losing) == 1:
+        return Sentence("Fix %(part)s, then submit again.", part=_format_part(losing[0]))
     return Sentence("Fix these parts, then submit again: %(parts)s.", parts=_join_parts(losing))
+
+
+def _list_losing_files(cause: Cause) -> tuple[str, ...]:
+    """Return the files of the parts that lose the marks; empty for another kind of cause."""
+    if cause.kind != "parts":
+        return ()
+    reruns = [rerun for rerun in cause.reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
+    return tuple(_format_part(part) for part in decide_losing_parts(reruns, cause.criterion))
 
 
 def describe_result(rerun: Rerun, criterion: str) -> str:

@@ -37,6 +37,8 @@ from submissions.assignment.definition import Trial
 CauseKind = Literal["parts", "conditions", "chance", "time", "start", "source"]
 Item = TypeVar("Item")
 _OTHER_NOISES = 5
+#: Keys of criteria whose expectation can depend on the start pose.
+_EXPECTATIONS = frozenset({"truth", "expected"})
 _MAX_CAUSES = 3
 
 
@@ -74,7 +76,7 @@ def find_causes(
         HostError: The machine failed.
         Exception: Whatever the heartbeat of the engine raises.
     """
-    own_finders = (_build_part_finder(reference), _find_conditions, _find_time, _find_start)
+    main_finders = (_build_part_finder(reference), _find_conditions, _find_time)
     causes: list[Cause] = []
     for criterion in engine.assignment.criteria:
         if criterion.id not in engine.lost_criteria or not criterion.judges_runs or criterion.result_needed:
@@ -84,8 +86,10 @@ def find_causes(
         engine.start_cause(budget)
         found_causes: list[Cause] = []
         try:
-            for finder in (*own_finders, *finders):
+            for finder in (*main_finders, *finders):
                 found_causes += itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes))
+            if not found_causes:
+                found_causes += _find_start(engine, criterion.id)
         except BudgetSpent:
             pass
         causes += found_causes
@@ -147,7 +151,13 @@ def _find_time(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
 
 
 def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
-    """Yield the start pose as the cause, if a trial passes from the start of a visible trial that passed."""
+    """Yield the start pose as the cause, if a trial passes from the start of a visible trial that passed.
+
+    Criteria that expect something else from each pose would be judged by what the original pose shows.
+    """
+    schema = next(each for each in engine.assignment.criteria if each.id == criterion)
+    if _EXPECTATIONS & type(schema).model_fields.keys():
+        return
     failed_trials = engine.list_failed_trials(criterion)
     for trial in failed_trials[:1]:
         definition = engine.trials[trial]

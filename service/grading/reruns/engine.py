@@ -138,6 +138,7 @@ class RerunEngine:
     def start_cause(self, budget: Budget = DEFAULT_BUDGET) -> None:
         """Begin with a full budget. Reruns that are known already cost nothing."""
         self._budget, self._runs, self._cpu_seconds = budget, 0, 0.0
+        self._dearest_seconds = 0.0  # of one run
 
     @property
     def has_exchangeable_parts(self) -> bool:
@@ -188,17 +189,15 @@ class RerunEngine:
         known_rerun = self._reruns.get((tuple(trials), keys))
         if known_rerun is not None:
             return known_rerun
+        recordings = {index: self._record(index, exchanges, keys) for index in trials}
         start = time.process_time()
-        try:
-            recordings = {index: self._record(index, exchanges, keys) for index in trials}
-            rerun = Rerun(
-                tuple(exchanges),
-                {index: self.results[index].recording for index in trials},
-                recordings,
-                self._judge(recordings, exchanges),
-            )
-        finally:
-            self._cpu_seconds += time.process_time() - start
+        rerun = Rerun(
+            tuple(exchanges),
+            {index: self.results[index].recording for index in trials},
+            recordings,
+            self._judge(recordings, exchanges),
+        )
+        self._cpu_seconds += time.process_time() - start
         self._reruns[tuple(trials), keys] = rerun
         return rerun
 
@@ -207,14 +206,18 @@ class RerunEngine:
         if known_recording is not None:
             return known_recording
         seconds_left = self._budget.cpu_seconds - self._cpu_seconds
-        if self._runs >= self._budget.runs or seconds_left <= 0:
+        # A run that is as dear as the dearest so far must still fit.
+        if self._runs >= self._budget.runs or seconds_left <= self._dearest_seconds:
             raise BudgetSpent
         self._runs += 1
+        start = time.process_time()
         meter = JobMeter(JobLimits(cpu_seconds=seconds_left), self._heartbeat)
         spec = build_trial_spec(self.trials[index], self._trial_plan)
         spec = apply_exchanges(replace(spec, records_lines=False), exchanges)
         recording = self._plan.trial.run(spec, self.assignment.world.obstacles, self._runner, meter)
-        self._cpu_seconds += meter.spent.cpu_seconds
+        seconds = meter.spent.cpu_seconds + time.process_time() - start
+        self._cpu_seconds += seconds
+        self._dearest_seconds = max(self._dearest_seconds, seconds)
         if meter.spent.cpu_seconds >= seconds_left:
             # The limit of the budget may have ended the trial, so its recording proves nothing.
             raise BudgetSpent
