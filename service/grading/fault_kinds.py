@@ -50,6 +50,12 @@ class FaultKind(Enum):
     INDENTATION_ERROR = r"^IndentationError"
     NO_BLOCK = r"^IndentationError: expected an indented block after .{1,60}? on line (\d+)"  # line of the block's head
     UNCLOSED_TEXT = r"^SyntaxError: unterminated (triple-quoted )?(?:f-)?string literal"  # empty with single quotes
+    #: The types of both operands, one of which is None.
+    NONE_OPERAND = (
+        r"^TypeError: (?=.*'NoneType').*(?:operand type\(s\) for .*|between instances of) '(\w+)' and '(\w+)'"
+    )
+    BAD_PERCENTAGE = r"(-?[\d.]+) is an invalid percentage"  # percentage
+    MISSING_ARGUMENT = r"(\w+)\(\) missing 1 required positional argument: '(\w+)'"  # function, parameter
     OPEN_BRACE = r"^SyntaxError: f-string: expecting '}'"
     #: Functions of the student that Robomark calls.
     MISSING_FUNCTION = r"there is no function called (\w+)"  # function

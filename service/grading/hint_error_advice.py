@@ -20,6 +20,10 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             translatable("Convert other values with str(), or use an f-string."),
         ),
         (
+            r"unsupported operand type\(s\) for \+: 'int' and '(?:tuple|list|dict|str)'\n.*\bsum\(",
+            translatable("sum adds numbers. To count the entries, write len(...)."),
+        ),
+        (
             r"unsupported operand type\(s\) for \+=?: .*'str'.*\n.*(?:\+\s*f?[\"']|[\"']\s*\+)",
             translatable("+ joins texts only: write str(...) around the number."),
         ),

@@ -43,6 +43,14 @@ from service.grading.hint_operands import (
 from service.grading.hint_skipped_loops import describe_skipped_loops
 from service.grading.hint_syntax import advise_on_syntax
 from service.grading.hint_tables import PROPERTIES, UNAVAILABLE_MODULES, USAGE
+from service.grading.hint_value_sources import (
+    advise_on_last_index,
+    advise_on_later_loop,
+    advise_on_list_argument,
+    advise_on_none,
+    advise_on_percentage,
+    advise_on_quoted_amount,
+)
 from service.grading.judging.message_parts import quote_text
 from service.language import translatable
 from sim.recording import Fault, Verdict
@@ -345,6 +353,7 @@ _ADVISERS: Sequence[_Adviser] = (
     advise_on_later_cell,
     advise_on_other_process,
     advise_on_later_line,
+    advise_on_later_loop,
     advise_on_overwritten_name,
     _advise_on_lost_message,
     _advise_on_null,
@@ -360,12 +369,17 @@ _ADVISERS: Sequence[_Adviser] = (
     _advise_on_fit,
     advise_on_keyword,
     advise_on_short_list,
+    advise_on_last_index,
     advise_on_parameter,
     advise_on_mean_axis,
     advise_on_missing_alias,
     advise_on_sample_count,
     advise_on_text_operand,
+    advise_on_quoted_amount,
     advise_on_list_operand,
+    advise_on_list_argument,
+    advise_on_none,
+    advise_on_percentage,
     advise_on_device,
     advise_on_whole_object,
     _advise_on_labels,

@@ -260,6 +260,16 @@ def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
             expected=name,
         )
     listing, head = function
+    fault = _find_call_fault(criterion, clues)
+    missing = None if fault is None or fault.line else read_values(fault, FaultKind.MISSING_ARGUMENT)
+    if missing is not None and missing[0] == name:
+        return Sentence(
+            "%(place)s: %(function)s is also called without %(name)s. Give %(name)s a value for such calls, with "
+            "%(name)s=... in this line, or remove it",
+            place=listing.locate(head.line),
+            function=name,
+            name=missing[1],
+        )
     body = listing.code.list_body(head)
     returns = [each for each in body if each.keyword == "return" and len(each.tokens) > 1]
     print_statement = next((each for each in body if each.keyword == "print"), None)

@@ -59,7 +59,7 @@ _DEVICE_READINGS: Mapping[str, str] = MappingProxyType(
 
 def advise_on_text_operand(fault: Fault, _: Clues, listing: Listing | None, statement: Statement | None) -> str:
     """Return advice on a variable that is compared or calculated with, and was assigned a number in quotes."""
-    if listing is None or statement is None or not is_kind(fault, FaultKind.TEXT_OPERAND):
+    if listing is None or statement is None or not is_kind(fault, FaultKind.TEXT_OPERAND, FaultKind.LIST_OPERAND):
         return ""
     for assignment in _list_assignments(listing, statement):
         match = _DIGITS.match(assignment.tokens[2]) if len(assignment.tokens) == 3 else None

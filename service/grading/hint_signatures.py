@@ -59,7 +59,10 @@ def hint_about_signatures(clues: Clues) -> Iterator[str]:
                 )
             )
             definition = listing.locate(head.line)
-            yield Sentence(template, place=location, name=name, definition=definition, parameters=parameters)
+            hint = Sentence(template, place=location, name=name, definition=definition, parameters=parameters)
+            missing = read_values(fault, FaultKind.MISSING_ARGUMENT)
+            advice = "" if missing is None else Sentence("Write a value for %(name)s in the brackets.", name=missing[1])
+            yield Sentence("%(problem)s. %(advice)s", problem=hint, advice=advice) if advice else hint
             return
 
 

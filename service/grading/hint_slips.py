@@ -19,6 +19,7 @@ from service.grading.hint_operands import (
     check_second_text,
 )
 from service.grading.hint_tables import READINGS
+from service.grading.hint_value_sources import describe_overwritten_list, is_overwritten_list
 from service.grading.hint_variables import (
     check_early_step,
     check_mixed_sides,
@@ -26,6 +27,7 @@ from service.grading.hint_variables import (
     check_removal_in_loop,
     check_unreachable_if,
 )
+from service.grading.judging.message_parts import add_place
 from service.language import translatable
 from sim.sentences import Sentence
 
@@ -70,6 +72,17 @@ def collect_slips(listing: Listing) -> Iterator[str]:
             sentence = check(listing, statement)
             if sentence:
                 yield sentence
+
+
+def _check_overwritten_list(listing: Listing, statement: Statement) -> str:
+    """Return a hint on ``found = found.append(day)``, which makes found None."""
+    # Other objects, such as tables, have methods of the same name that return a new object.
+    is_list = is_overwritten_list(statement) and any(
+        each.target == statement.target and each.tokens[2] in ("[", "list") for each in listing.code.statements
+    )
+    if not is_list:
+        return ""
+    return add_place(listing.locate(statement.line), describe_overwritten_list(statement))
 
 
 def _check_caret(listing: Listing, statement: Statement) -> str:
@@ -349,6 +362,7 @@ _SLIP_CHECKS: Sequence[_SlipCheck] = (
     check_early_step,
     check_removal_in_loop,
     check_unreachable_if,
+    _check_overwritten_list,
     _check_caret,
     _check_bitwise_operator,
     _check_constant_operand,

@@ -113,6 +113,8 @@ def test_a_fix_is_not_for_another_mistake(text: str, never: str) -> None:
     assert never not in syntax_advice(text)
 
 
+_NONE = "TypeError: unsupported operand type(s) for -: 'NoneType' and 'NoneType'"
+_SEQUENCE = "TypeError: can't multiply sequence by non-int of type 'float'"
 _STR_INT = "TypeError: '<' not supported between instances of 'str' and 'int'"
 
 
@@ -146,6 +148,54 @@ _STR_INT = "TypeError: '<' not supported between instances of 'str' and 'int'"
             "a = 1\nx = ultrasonic / 10",
             "TypeError: unsupported operand type(s) for /: 'UltrasonicSensor' and 'int'",
             "ultrasonic.distance_centimeters",
+        ),
+        ('a = 1\ntank_drive.on_for_seconds(50, 50, "2")', _STR_INT, "Write 2."),
+        ('far = "3"\ntank_drive.on_for_rotations(40, 40, far)', _SEQUENCE, "Write far = 3 there"),
+        (
+            "def go(far):\n    tank_drive.on_for_rotations(40, 40, far)\ngo([1, 2])",
+            _SEQUENCE,
+            "Line 3 gives go a whole list. Call it once for each entry: for value in [1, 2]:",
+        ),
+        (
+            "a = 1\nb = day + 1\nfor day in range(3):",
+            "NameError: name 'day' is not defined",
+            "Move line 2 into the loop",
+        ),
+        (
+            "a = None\nif a == 0:\n    a = 1\nb = a - a",
+            _NONE,
+            "line 3 has not run. Check the condition in line 2, a == 0. None never equals 0: write a is None.",
+        ),
+        (
+            "a = None\nwhile a - a:\n    if b > 9:\n        a = b",
+            _NONE,
+            "Check the condition in line 3, b > 9.",
+        ),
+        (
+            "a = []\na = a.append(3)\na = a.append(4)",
+            "AttributeError: 'NoneType' object has no attribute 'append'",
+            "line 2 makes a None. Write a.append(3) alone there",
+        ),
+        (
+            "i = 0\nwhile i <= len(x):\n    y = x[i]",
+            "IndexError: list index out of range",
+            "Write < in place of <= in line 2",
+        ),
+        ("for i in range(len(x) + 1):\n    y = x[i]", "IndexError: list index out of range", "Remove + 1"),
+        (
+            "a = 1\ntank_drive.on(SpeedPercent(30 + a), SpeedPercent(30))",
+            "ValueError: 130 is an invalid percentage, must be between -100 and 100 (inclusive)",
+            "SpeedPercent(max(-100, min(100, 30 + a)))",
+        ),
+        (
+            "a = 1\nn = sum(places)",
+            "TypeError: unsupported operand type(s) for +: 'int' and 'tuple'",
+            "To count the entries, write len(...)",
+        ),
+        (
+            "speed = 30\ntank_drive.on(SpeedPercent(speed + 100), SpeedPercent(30))",
+            "ValueError: 130 is an invalid percentage, must be between -100 and 100 (inclusive)",
+            "from -100 to 100",
         ),
         ("x = 1\nprint['a']", "TypeError: 'builtin_function_or_method' object is not subscriptable", "print(...)"),
         ("x = 1\nx = int['5']", "TypeError: type 'int' is not subscriptable", "int(...)"),

@@ -51,6 +51,8 @@ def test_there_is_no_slip_in_programs_that_are_right() -> None:
     ("line", "words"),
     [
         ("area = side ^ 2", "Write ** instead of ^"),
+        ("days = []\nfor day in week:\n    days = days.append(day)", "Write days.append(day) alone there"),
+        ("numbers = [3, 1]\nnumbers = numbers.sort()", "line 2 makes numbers None"),
         ("if 10 < x & x < 20:", "Write and instead of &"),
         ("if x < 10 | y > 20:", "Write or instead of |"),
         ('while colour != "red" and "white":', 'Write and colour != "white"'),
