@@ -23,6 +23,9 @@ from sim.recording import Pose
 
 Obstacle = tuple[float, float, float, float]
 
+#: Limit of all kept images of a process. Each takes 8 MB.
+_MAX_CACHED_BYTES = 65_000_000
+
 #: Obstacles for each value of the flag ``-o``: x, y, width, height in mm, lower left corner first.
 OBSTACLE_PRESETS: Mapping[str, tuple[Obstacle, ...]] = MappingProxyType(
     {
@@ -155,20 +158,13 @@ def build_floor(name: str, *, labels: bool = True, seed: int = 0) -> Floor:
     Raises:
         UsageError: No floor has this name. The message suggests similar names.
     """
-    return _build_seeded_floor(name, labels, seed) if _get_definition(name).seeded else _build_fixed_floor(name, labels)
+    return _build_floor(name, labels, seed if _get_definition(name).seeded else 0)
 
 
-@functools.lru_cache(maxsize=12)  # an image takes 8 MB, and flags can select every floor
-def _build_fixed_floor(name: str, labels: bool) -> Floor:
-    return _draw_floor(_get_definition(name), labels, 0)
-
-
-@functools.lru_cache(maxsize=12)  # a worker receives new seeds all the time
-def _build_seeded_floor(name: str, labels: bool, seed: int) -> Floor:
-    return _draw_floor(_get_definition(name), labels, seed)
-
-
-def _draw_floor(plan: _FloorDefinition, labels: bool, seed: int) -> Floor:
+# A notebook can select every floor, and a worker receives new seeds all the time.
+@functools.lru_cache(maxsize=_MAX_CACHED_BYTES // (WIDTH * HEIGHT * 3))
+def _build_floor(name: str, labels: bool, seed: int) -> Floor:
+    plan = _get_definition(name)
     pixels, floor_labels = plan.draw(seed, label_patches=labels)
     return Floor(plan.name, _make_read_only(pixels), plan.pose, floor_labels, plan.obstacles, labels, seed)
 

@@ -112,6 +112,18 @@ def test_all_digits_are_as_likely() -> None:
     assert ((counts - expected) ** 2 / expected).sum() < 27.9  # chi squared, 9 degrees of freedom, 0.1 %
 
 
+def test_kept_images_take_at_most_65_mb() -> None:
+    names = ("Loop", "Two_shapes", "Grey_bands", "Linear_grey", "Coloured_bands", "Rainbow_bands", "Square")
+    first = floors.build_floor("Empty_Map")
+    for name in names:
+        floors.build_floor(name)
+    assert floors.build_floor("Empty_Map") is first
+    for name in (*names, "Lollipop"):
+        floors.build_floor(name)
+    assert floors.build_floor("Empty_Map") is not first
+    assert (len(names) + 1) * first.pixels.nbytes < 65_000_000
+
+
 def test_a_seed_changes_no_other_floor_and_a_sheet_is_kept() -> None:
     assert floors.build_floor("Loop", seed=5) is floors.build_floor("Loop")
     assert floors.build_floor("MNIST_Digits", seed=0) is floors.build_floor("MNIST_Digits")
