@@ -17,15 +17,28 @@ from service.statements.facts import FactKind, OpenFact, commit_to_facts
 from service.statements.keys_document import KeyLine
 from service.statements.log_head import FiledHead
 from service.statements.merkle_tree import compute_root
-from service.statements.statement import PAYLOAD_TYPE, Change, format_moment, parse_statement
+from service.statements.statement import PAYLOAD_TYPE, Change, Statement, format_moment, parse_statement
 from service.store.grades.statements import load_marks_facts
 from service.store.statement_log import list_keys
 from service.store.states import JobState, Standing
+from service.store.tables.courses import AssignmentVersion
+from service.store.tables.people import Enrolment
 from service.store.tables.statements import StatementEntry
-from service.store.tables.submissions import Job
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
 _CHUNK_SIZE = 500
+#: Missing entries that are named one by one.
+_MAX_NAMED_GAP = 1000
+#: What a statement says of the submission, in the order of ``_Entry.submission``.
+_SUBMISSION_PARTS = (
+    "student",
+    "assignment",
+    "version of the assignment",
+    "attempt",
+    "time of submission",
+    "submission",
+)
 _MARKS_KINDS = (FactKind.TOTAL, FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
 
 
@@ -65,6 +78,7 @@ class _Entry:
     issued_at: Any = None
     erased: tuple[int, ...] = ()
     commitments: Mapping[str, Any] = field(default_factory=dict)
+    submission: tuple[Any, ...] = (None,) * len(_SUBMISSION_PARTS)
 
 
 @dataclass(slots=True)
@@ -139,11 +153,13 @@ def _load_entries(session: Session, filed_leaves: Mapping[int, bytes], keys: Map
             problem = "was moved: its statement has another number"
         elif filed_leaves.get(number) != leaf:
             problem = _check_signature(envelope, keys.get(envelope.key_id))
-        yield _Entry(*head, is_empty=False, problem=problem, **_summarise(statement.predicate))
+        yield _Entry(*head, is_empty=False, problem=problem, **_summarise(statement))
 
 
-def _summarise(predicate: Mapping[str, Any]) -> dict[str, Any]:
+def _summarise(statement: Statement) -> dict[str, Any]:
     """Return the fields of an entry that its statement has; the commitments without those to trials."""
+    predicate = statement.predicate
+    assignment = predicate.get("assignment", {})
     commitments, erased = predicate.get("commitments"), predicate.get("erased")
     listed = commitments if isinstance(commitments, dict) else {}
     return {
@@ -151,6 +167,14 @@ def _summarise(predicate: Mapping[str, Any]) -> dict[str, Any]:
         "issued_at": predicate.get("issued_at"),
         "erased": tuple(each for each in erased if type(each) is int) if isinstance(erased, list) else (),
         "commitments": {kind: listed.get(kind) for kind in _MARKS_KINDS},
+        "submission": (
+            predicate.get("student"),
+            assignment.get("id"),
+            assignment.get("version"),
+            predicate.get("attempt"),
+            predicate.get("submitted_at"),
+            statement.subjects.get("submission"),
+        ),
     }
 
 
@@ -172,11 +196,15 @@ def _read_hex(text: str | None) -> bytes:
 
 def _check_numbers(entries: Sequence[_Entry], filed_size: int, findings: _Findings) -> None:
     """Name missing entries: the numbers have no gaps, and reach at least to the largest filed head."""
-    present_numbers = {entry.number for entry in entries}
-    size = max(filed_size, *(number + 1 for number in present_numbers), 0)
-    for number in range(size):
-        if number not in present_numbers:
-            findings.name_entry(number, "was removed")
+    next_number = 0
+    for number in (*(entry.number for entry in entries), filed_size):
+        first_unnamed = min(number, next_number + _MAX_NAMED_GAP)
+        for missing_number in range(next_number, first_unnamed):
+            findings.name_entry(missing_number, "was removed")
+        if first_unnamed < number and next_number < number:
+            sentence = f"entries {first_unnamed} to {number - 1} were removed, too"
+            findings.items.append(LogFinding(None, None, sentence))
+        next_number = max(next_number, number + 1)
 
 
 def _compare_filed_leaves(
@@ -204,7 +232,9 @@ def _compare_filed_leaves(
 def _check_times(entries: Sequence[_Entry], filed_heads: Sequence[FiledHead], findings: _Findings) -> None:
     """Name entries that are older than an earlier entry or than a head that was filed before them."""
     newest_time = ""
-    head_times = {head.size: head.issued_at for head in filed_heads}
+    head_times: dict[int, str] = {}
+    for head in filed_heads:
+        head_times[head.size] = max(head.issued_at, head_times.get(head.size, ""))
     for entry in entries:
         newest_time = max(newest_time, head_times.get(entry.number, ""))
         issued_at = entry.made_at
@@ -249,8 +279,31 @@ def _check_grades(session: Session, entries: Sequence[_Entry], findings: _Findin
             sentence = f"of entry {entry.number} was removed, or is no longer published"
             findings.name_grade(entry.number, entry.job_id, sentence)
     for start in range(0, len(stated_jobs), _CHUNK_SIZE):
-        _compare_marks(session, dict(stated_jobs[start : start + _CHUNK_SIZE]), findings)
+        chunk = dict(stated_jobs[start : start + _CHUNK_SIZE])
+        _compare_submissions(session, chunk, findings)
+        _compare_marks(session, chunk, findings)
     return len(published_jobs), older_grades
+
+
+def _compare_submissions(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:
+    """Name grades that are now of another student or submission than in their statements."""
+    query = (
+        select(Job.id, Job.enrolment_id == SubmissionRow.enrolment_id, SubmissionRow, Enrolment.student)
+        .add_columns(AssignmentVersion.assignment, AssignmentVersion.version)
+        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+        .where(Job.id.in_(entries_by_job))
+    )
+    for job_id, is_own, row, student, assignment, version in session.execute(query):
+        submitted_at = format_moment(row.submitted_at or row.created_at)
+        actual = (student, assignment, version, row.attempt, submitted_at, row.sha256)
+        entry = entries_by_job[job_id]
+        pairs = zip(_SUBMISSION_PARTS, actual, entry.submission, strict=True)
+        changed = [name for name, now, stated in pairs if now != stated]
+        if changed or not is_own:
+            what = changed[0] if changed else "student"
+            findings.name_grade(entry.number, job_id, f"was moved: its {what} is not that of entry {entry.number}")
 
 
 def _compare_marks(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:

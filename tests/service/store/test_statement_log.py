@@ -28,13 +28,14 @@ from service.statements.statement_file import parse_statement_file
 from service.store import statement_log as entries
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store
+from service.store.grades import log_check
 from service.store.purge import purge_submissions
 from service.store.queue import jobs, self_tests
 from service.store.states import Standing
 from service.store.tables.grades import CriterionResultRow
 from service.store.tables.people import Enrolment
 from service.store.tables.statements import StatementEntry, StatementKey
-from service.store.tables.submissions import Job
+from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import UsageError
 
 GRADE = report_builders.faulty_grade()
@@ -226,6 +227,32 @@ def _back_date(session: Session, job_id: str) -> None:
     )
 
 
+def _rename_student(session: Session, job_id: str) -> None:
+    row = session.scalars(select(Enrolment).join(Job, Job.enrolment_id == Enrolment.id).where(Job.id == job_id)).one()
+    row.student = "eve"
+
+
+def _move_submission(session: Session, job_id: str) -> None:
+    submission_id = select(Job.submission_id).where(Job.id == job_id).scalar_subquery()
+    other_id = select(Enrolment.id).where(Enrolment.student == "dee").scalar_subquery()
+    session.execute(
+        update(SubmissionRow).where(SubmissionRow.id == submission_id).values(enrolment_id=other_id, attempt=2)
+    )
+
+
+def _show_elsewhere(session: Session, job_id: str) -> None:
+    other_id = select(Enrolment.id).where(Enrolment.student == "dee").scalar_subquery()
+    session.execute(update(Job).where(Job.id == job_id).values(enrolment_id=other_id))
+
+
+def _set_submission(**values: Any) -> Callable[[Session, str], None]:
+    def change(session: Session, job_id: str) -> None:
+        submission_id = select(Job.submission_id).where(Job.id == job_id).scalar_subquery()
+        session.execute(update(SubmissionRow).where(SubmissionRow.id == submission_id).values(**values))
+
+    return change
+
+
 TAMPERINGS: dict[str, tuple[Callable[[Session, str], None], str]] = {
     "total changed": (_change_marks, "its total is not that of entry 2"),
     "criterion changed": (_change_criterion, f"its criterion {GRADE.criteria[0].id} is not that of entry 2"),
@@ -274,6 +301,49 @@ def test_a_head_without_its_hashes_says_that_history_differs(store: Store, publi
     (finding,) = _check(store, late_head).findings
     assert finding.entry is None
     assert finding.sentence.startswith("the first 5 entries are not those of the head")
+
+
+MOVES: dict[str, Callable[[Session, str], None]] = {
+    "student": _rename_student,
+    "student ": _move_submission,
+    "student  ": _show_elsewhere,
+    "attempt": _set_submission(attempt=7),
+    "submission": _set_submission(sha256="0" * 64),
+    "time of submission": _set_submission(submitted_at=datetime(2020, 1, 1, tzinfo=UTC)),
+}
+
+
+def test_a_grade_of_another_student_or_submission_is_named(store: Store, published: Published) -> None:
+    for what, move in MOVES.items():
+        with store.transaction() as session:
+            savepoint = session.begin_nested()
+            move(session, published.jobs["cyd"])
+            session.flush()
+            (finding,) = log_check.check_log(session, ()).findings
+            savepoint.rollback()
+        assert finding.sentence.endswith(f"was moved: its {what.strip()} is not that of entry 2")
+    assert _check(store).findings == ()
+
+
+def test_an_entry_between_two_heads_of_the_same_size_is_compared_with_both(store: Store, published: Published) -> None:
+    early_head, late_head = _write_head(store), _write_head(store)
+    _set_marks(store, published, "ada")
+    with store.transaction() as session:
+        row = session.get_one(StatementEntry, 4)
+        row.made_at = datetime.fromisoformat(early_head.issued_at)
+        _rewrite_entry(row, entries.ensure_signing_key(session), issued_at=early_head.issued_at)
+    for heads in ((early_head, late_head), (late_head, early_head)):
+        assert "entry 4 was back-dated" in _check(store, *heads).findings[0].sentence
+
+
+def test_a_gap_of_any_size_is_named(store: Store, published: Published) -> None:
+    with store.transaction() as session:
+        session.execute(insert(StatementEntry).values(number=2**31 - 1, leaf_sha256="", made_at=datetime.now(UTC)))
+    findings = _check(store).findings
+    assert (findings[0].entry, findings[0].sentence) == (4, "entry 4 was removed")
+    sentences = [each.sentence for each in findings]
+    assert f"entries {4 + 1000} to {2**31 - 2} were removed, too" in sentences
+    assert len(findings) == 1000 + 2
 
 
 def test_a_head_of_another_installation_is_refused(store: Store, published: Published) -> None:
