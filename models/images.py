@@ -1,22 +1,23 @@
-"""Images of the robot's left light sensor at given poses, made with the drive, camera and noise of a trial.
+"""Images of the robot's left light sensor at given poses, made with the sensor, camera and noise of a trial.
 
 Each pose has the class of the object shown there; ``evaluation.py`` compares it with the prediction.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
 from models.preprocessing import Grey, extract_focus
-from sim.arena import Arena
 from sim.camera import Cameras
 from sim.floors import Floor, build_floor
+from sim.light_sensors import LightReader, compute_footprint
 from sim.random_streams import RandomStream
 from sim.recording import Pose
 from sim.robot import get_robot
-from sim.world import HashChain, Noise, World
+from sim.trigonometry import sincos
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +44,9 @@ class Photographer:
     """Robot that takes images at given poses. Use it as a context manager."""
 
     def __init__(self) -> None:
-        self._arena = Arena(())
         # The test visits up to six sheets, once for each value of a varied condition.
         self._cameras = Cameras(capacity=6)
-        self._robot = get_robot("Default_Robot")
+        self._sensor = get_robot("Default_Robot").left_light
 
     def __enter__(self) -> Photographer:
         return self
@@ -55,14 +55,17 @@ class Photographer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._cameras.close()
-        self._arena.close()
 
     def take_image(self, place: LabelledPose, shift: Shift, seed: int = 0) -> Grey:
-        """Return the grey focus of the left light sensor, shape (14, 14)."""
-        pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
+        """Return the grey focus of the left light sensor, shape (14, 14).
+
+        It is the image of a whole world at tick 0, which would also compute the motors and all other sensors.
+        """
+        sine, cosine = sincos(math.radians(place.pose.heading + shift.heading) - math.pi / 2)
+        footprint = compute_footprint(self._sensor, place.pose.x + shift.x, place.pose.y + shift.y, sine, cosine)
         camera = self._cameras.open_camera(_build_place_floor(place).pixels)
-        world = World(self._robot, self._arena, camera, pose, Noise(light=shift.noise), seed, HashChain())
-        return extract_focus(world.render_images()[0])
+        reader = LightReader(self._sensor, camera, shift.noise, RandomStream(seed, "left light"))
+        return extract_focus(reader.render_image(footprint, 0))
 
     def draws(
         self, places: Sequence[LabelledPose], shift: Shift, name: str, draws: int

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import OrderedDict
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -37,11 +38,14 @@ class LightCamera(Protocol):
         ...
 
 
+@cache
 def build_sensor_mask(side: int) -> NDArray[np.bool_]:
     """Return the mask of the round sensor, shape (side, side): 305 pixels for a side of 20 (robolab section 4)."""
     radius = side / 2
     rows, columns = np.mgrid[0:side, 0:side]
-    return np.asarray((rows - radius) ** 2 + (columns - radius) ** 2 < radius**2)
+    mask = np.asarray((rows - radius) ** 2 + (columns - radius) ** 2 < radius**2)
+    mask.flags.writeable = False  # all sensors of this size share it
+    return mask
 
 
 def _build_projection(half: float, shift: float) -> tuple[float, ...]:

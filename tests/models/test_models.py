@@ -17,13 +17,17 @@ from models.evaluation import evaluate
 from models.families import digits, shapes
 from models.images import LabelledPose, Photographer, Shift
 from models.perceptrons import load_perceptron
-from models.preprocessing import compute_features
+from models.preprocessing import compute_features, extract_focus
 from models.tasks import load_tasks
 from models.training import train
+from sim.arena import Arena
+from sim.camera import Cameras
 from sim.errors import UsageError
 from sim.floors import build_floor
 from sim.floors.digits import load_sheet_digits
 from sim.recording import Pose
+from sim.robot import get_robot
+from sim.world import HashChain, Noise, World
 
 #: One model of each file format is measured here. The cards of all models are compared with training's measurements.
 MEASURED = ["shapes", pytest.param("digits-cnn", marks=pytest.mark.long)]
@@ -222,6 +226,20 @@ def test_noise_is_drawn_afresh_for_each_draw_and_again_the_same() -> None:
         again = next(grey for _, grey in photographer.draws([place], Shift(noise=32), "test", 2))
     assert not np.array_equal(first, second)
     assert np.array_equal(first, again)
+
+
+@pytest.mark.parametrize("shift", [Shift(), Shift(noise=64), Shift(x=1.5, y=-2.25, heading=-7.3, noise=10)])
+def test_an_image_is_that_of_a_world_at_its_start(shift: Shift) -> None:
+    place = shapes.list_shape_poses()[4]
+    pose = Pose(place.pose.x + shift.x, place.pose.y + shift.y, place.pose.heading + shift.heading)
+    with Photographer() as photographer:
+        grey = photographer.take_image(place, shift, seed=5)
+    cameras, arena = Cameras(capacity=1), Arena(())
+    camera = cameras.open_camera(build_floor(place.background, seed=place.sheet).pixels)
+    world = World(get_robot("Default_Robot"), arena, camera, pose, Noise(light=shift.noise), 5, HashChain())
+    assert np.array_equal(grey, extract_focus(world.render_images()[0]))
+    cameras.close()
+    arena.close()
 
 
 def test_an_unknown_model_is_named(tmp_path: Path) -> None:
