@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +18,8 @@ from typing import Any
 import pytest
 
 from benchmarks.harness.process_tree import find_children
-from command import COMMAND
 from hostile import FIND_WIRE, forged, packed
+from paths import HELPERS, ROOT
 from processes import until
 from responders.bridge import Bridge
 from responders.conversation import Conversation
@@ -299,24 +300,33 @@ def test_honest_trials_sleep_next_to_nothing(runner: TrialRunner) -> None:
     assert meter.spent.sleep_seconds < 0.5
 
 
+_STARVED = textwrap.dedent("""
+    from responders.sandbox.meter import JobLimits, JobMeter
+    from running import run_program
+    from service.grading.trial_runner import TrialRunner
+    program = "while True:\\n    colorLeft.reflected_light_intensity\\n    time.sleep(0.01)\\n"
+    with TrialRunner() as runner:
+        meter = JobMeter(JobLimits(sleep_seconds=4.0))
+        print(run_program(runner, "import time\\n" + program, seconds=6, meter=meter).verdict.value)
+""")
+
+
 @pytest.mark.long
-def test_a_worker_that_waits_for_a_processor_itself_calls_nobody_asleep(tmp_path: Path) -> None:
-    program = tmp_path / "robot.py"
-    program.write_text(
-        "from time import sleep\nwhile True:\n    colorLeft.reflected_light_intensity\n    sleep(0.01)\n"
-    )
+def test_a_worker_that_waits_for_a_processor_itself_calls_nobody_asleep() -> None:
+    """It takes several times as long as a program may sleep."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]
     try:
         ended = subprocess.run(
-            ["nice", "-n", "10", *COMMAND, "run", str(program), "--seconds", "30"],
+            ["nice", "-n", "10", sys.executable, "-c", _STARVED],
+            env=os.environ | {"PYTHONPATH": str(HELPERS)},
+            cwd=ROOT,
             capture_output=True,
             text=True,
             timeout=500,
-            check=False,
+            check=True,
         )
     finally:
         for each in busy:
             each.kill()
             each.wait()
-    assert ended.returncode == 0
-    assert "still running at the end" in ended.stdout
+    assert ended.stdout.strip() == Verdict.TIME_LIMIT.value

@@ -33,10 +33,10 @@ def test_on_sqlite(tmp_path: Path) -> None:
     with open_store(settings) as store:
         injector = FaultInjector(settings, store, None, workers=2, seed=1, disk=None)
         try:
-            tally = Campaign(36, pause=(0.5, 1.5)).run(injector, quiet)
+            tally = Campaign(24, pause=(0.3, 1.0)).run(injector, quiet)
         finally:
             injector.stop()
-    _assert_whole(tally, 36)
+    _assert_whole(tally, 24)
     assert sum(tally.injected.values()) >= 3
 
 
@@ -50,10 +50,10 @@ def test_on_postgresql(tmp_path: Path) -> None:
             with open_store(settings) as store:
                 injector = FaultInjector(settings, store, server, workers=2, seed=2, disk=disk)
                 try:
-                    tally = Campaign(90, pause=(0.5, 2.0)).run(injector, compute_expected_hashes())
+                    tally = Campaign(60, pause=(0.3, 1.3)).run(injector, compute_expected_hashes())
                 finally:
                     injector.stop()
         finally:
             server.close()
-    _assert_whole(tally, 90)
+    _assert_whole(tally, 60)
     assert sum(tally.injected.values()) >= 5

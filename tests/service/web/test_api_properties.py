@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import schemathesis
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, note, settings
 from schemathesis.core.result import Ok
 from schemathesis.generation import GenerationMode
 from schemathesis.specs.openapi import checks
@@ -48,31 +48,32 @@ def described_api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[We
         with web.store.transaction() as session:
             open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             open_assignments.open_for_students(session, 1, "echo-responder")
-        members = {"instructor": world.grace, "student": world.ada, "operator": web.operator()}
+        # Fewest rights first: what one of them deletes, the next can no longer reach.
+        members = {"student": world.ada, "instructor": world.grace, "operator": web.operator()}
         tokens = {who: web.token(member, "read", "submit", "mark", "manage") for who, member in members.items()}
         yield web, tokens, world.values
 
 
-@pytest.mark.parametrize("who", ["instructor", "student", "operator"])
 @pytest.mark.parametrize("mode", list(GenerationMode))
-def test_every_answer_is_as_it_is_described(
-    described_api: tuple[Web, Any, Any], who: str, mode: GenerationMode
-) -> None:
+def test_every_answer_is_as_it_is_described(described_api: tuple[Web, Any, Any], mode: GenerationMode) -> None:
+    """Every kind of reader sends the same requests, because generating one takes longer than answering it."""
     web, tokens, values = described_api
     schema = schemathesis.openapi.from_dict(web.app.openapi())
     schema.app = web.app
     for each in schema.get_all_operations():
         assert isinstance(each, Ok)
-        _try(each.ok(), mode, tokens[who], values)
+        _try(each.ok(), mode, tokens, values)
 
 
-def _try(operation: Any, mode: GenerationMode, token: dict[str, str], values: dict[str, str]) -> None:
+def _try(operation: Any, mode: GenerationMode, tokens: dict[str, dict[str, str]], values: dict[str, str]) -> None:
     @_EXAMPLES
     @given(case=operation.as_strategy(generation_mode=mode))
     def answers(case: Any) -> None:
         for name in case.path_parameters or {}:
             case.path_parameters[name] = values.get(name, case.path_parameters[name])
-        answer = case.call(base_url="http://localhost", headers=token)
-        case.validate_response(answer, excluded_checks=_NOT_TOLD)
+        for who, token in tokens.items():
+            note(f"as {who}")
+            answer = case.call(base_url="http://localhost", headers=token)
+            case.validate_response(answer, excluded_checks=_NOT_TOLD)
 
     answers()
