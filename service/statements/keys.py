@@ -1,14 +1,18 @@
-"""Ed25519 keys (RFC 8032) that sign statements, receipts and heads of the log. The store keeps the private keys."""
+"""Ed25519 keys (RFC 8032) that sign statements, receipts and heads of the log. The store keeps the private keys.
+
+``cryptography`` is imported when a key is used: most commands load this module and sign nothing.
+"""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from typing import TYPE_CHECKING
 
 from sim.errors import UsageError
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 #: Bytes of a public and of a private key.
 KEY_BYTES = 32
@@ -28,6 +32,9 @@ class PublicKey:
 
     def has_signed(self, signature: bytes, content: bytes) -> bool:
         """Return whether this key made the signature of ``content``."""
+        from cryptography.exceptions import InvalidSignature
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
         try:
             Ed25519PublicKey.from_public_bytes(bytes.fromhex(self.hex)).verify(signature, content)
         except InvalidSignature:
@@ -51,11 +58,15 @@ class SigningKey:
         return self._load().sign(content)
 
     def _load(self) -> Ed25519PrivateKey:
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
         return Ed25519PrivateKey.from_private_bytes(bytes.fromhex(self.hex))
 
 
 def generate_signing_key() -> SigningKey:
     """Return a new random key."""
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
     return SigningKey(Ed25519PrivateKey.generate().private_bytes_raw().hex())
 
 
