@@ -238,6 +238,8 @@ class ShownCause:
     next_step: str
     for_staff: bool = False
     files: tuple[str, ...] = ()
+    is_hidden: bool = False  # shown by hidden trials
+    staff_note: str = ""  # whether the student sees a cause in hidden trials
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +330,13 @@ def convert_texts(grade: Grade, convert: Callable[[str], str]) -> Grade:
         notes=tuple(convert(note) for note in grade.notes),
         hints=tuple(convert(hint) for hint in grade.hints),
         causes=tuple(
-            replace(each, text=convert(each.text), next_step=convert(each.next_step)) for each in grade.causes
+            replace(
+                each,
+                text=convert(each.text),
+                next_step=convert(each.next_step),
+                staff_note=convert(each.staff_note),
+            )
+            for each in grade.causes
         ),
     )
 

@@ -19,8 +19,8 @@ from service.store.tables.courses import Course
 from sim.errors import UsageError
 from submissions.archive_extraction import unzip
 from submissions.assignment.definition import Assignment
-from submissions.assignment.examples import EXAMPLES
-from submissions.assignment.folder import FILE_NAME, REFERENCE, list_catalogue_ids, locate_assignment_folder
+from submissions.assignment.examples import EXAMPLES, locate_catalogue_reference
+from submissions.assignment.folder import FILE_NAME, REFERENCE
 from submissions.assignment.reader import find_in_catalogue, read_assignment
 from submissions.bundle import read_submission
 from submissions.grading_request import GradingRequest
@@ -82,21 +82,13 @@ def preview(service: Service, actor: Actor, course_id: int, assignment: str) -> 
     with service.store.reading() as session:
         require_course(session, actor, course_id, Role.INSTRUCTOR)
         current_version = open_assignments.load_assignment(session, course_id, assignment)
-    reference = find_reference_solution(current_version)
+    reference = locate_catalogue_reference(current_version)
     if reference is None:
         raise UsageError(
             "this version of %(assignment)s has no reference solution; upload its folder again",
             assignment=assignment,
         )
     return _grade_reference(service, actor, course_id, current_version, reference)
-
-
-def find_reference_solution(assignment: Assignment) -> Path | None:
-    """Return the catalogue's reference solution; None if the course uses a different version."""
-    if assignment.id not in list_catalogue_ids() or find_in_catalogue(assignment.id).version != assignment.version:
-        return None
-    folder = locate_assignment_folder(assignment.id) / EXAMPLES / REFERENCE
-    return folder if folder.is_dir() else None
 
 
 def _check_replacement(service: Service, course_id: int, assignment: Assignment) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from service.operations.assignment_uploads import find_reference_solution
 from service.operations.assignments import CourseAssignment
 from service.operations.context import Actor, Service
 from service.operations.lookup import require_course, require_own_enrolment
@@ -15,6 +14,7 @@ from service.store.grades import own_gradings
 from service.store.grades.own_gradings import OwnGrading
 from service.store.states import CompletionRule, CountedAttempt, Role
 from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import locate_catalogue_reference
 from submissions.assignment.folder import list_catalogue_ids
 from submissions.assignment.reader import find_in_catalogue
 
@@ -85,6 +85,6 @@ def show(service: Service, actor: Actor, course_id: int, assignment: str) -> Ass
         own_policy,
         own_policy or limits_by_assignment.get("") or PolicyLimits(),
         previews,
-        has_reference=find_reference_solution(current_version) is not None,
+        has_reference=locate_catalogue_reference(current_version) is not None,
         changed=newest_version != line.version,
     )

@@ -13,11 +13,13 @@ from service.store.states import JobQueue
 
 TEST_RUNS = "tryouts"
 PLOTS = "plots"
+CAUSES = "causes"
 #: In order of priority for a worker. Students wait for test runs, whose number is limited.
-QUEUES = (JobQueue.INTERACTIVE.value, TEST_RUNS, JobQueue.BATCH.value, PLOTS, JobQueue.COMPLETION.value)
+QUEUES = (JobQueue.INTERACTIVE.value, TEST_RUNS, JobQueue.BATCH.value, PLOTS, JobQueue.COMPLETION.value, CAUSES)
 GRADE_TASK = "robomark.grade"
 TEST_RUN_TASK = "robomark.try"
 PLOT_TASK = "robomark.plot"
+EXPLAIN_TASK = "robomark.explain"
 
 #: Key with which the worker's command line disables the sandbox of its pool children. No setting, environment variable
 #: or task can set it.

@@ -16,10 +16,19 @@ from kombu.exceptions import OperationalError as BrokerError
 from redis.exceptions import RedisError
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.queue.celery_app import GRADE_TASK, PLOT_TASK, PLOTS, QUEUES, TEST_RUN_TASK, TEST_RUNS
+from service.queue.celery_app import (
+    CAUSES,
+    EXPLAIN_TASK,
+    GRADE_TASK,
+    PLOT_TASK,
+    PLOTS,
+    QUEUES,
+    TEST_RUN_TASK,
+    TEST_RUNS,
+)
 from service.settings import Settings
 from service.store.engine import Store
-from service.store.grades import plots
+from service.store.grades import causes, plots
 from service.store.queue import test_runs
 from service.store.queue.jobs import RetryPolicy
 from service.store.queue.lease_reaper import count_missing_notices, mark_not_notified, mark_notified, requeue_lost_jobs
@@ -58,6 +67,10 @@ class Notifier:
         """Notify for the plots of ``count`` jobs."""
         self._publish(PLOT_TASK, PLOTS, count)
 
+    def explain(self, count: int = 1) -> None:
+        """Notify for the causes of lost marks in ``count`` grades."""
+        self._publish(EXPLAIN_TASK, CAUSES, count)
+
     def catch_up(self) -> None:
         """Requeue lost jobs, and notify for due jobs without a notification.
 
@@ -73,6 +86,9 @@ class Notifier:
         due_plots = plots.count_due_plots(self.store)
         if due_plots:
             self.plot(self._count_missing(PLOTS, due_plots))
+        unexplained_grades = causes.count_unexplained_grades(self.store)
+        if unexplained_grades:
+            self.explain(self._count_missing(CAUSES, unexplained_grades))
 
     def waiting(self) -> int:
         """Return the number of notifications in the broker; 0 if it is unreachable."""

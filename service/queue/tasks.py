@@ -1,4 +1,4 @@
-"""The three Celery tasks, and the objects that a pool child keeps for them: the runner and the database.
+"""The four Celery tasks, and the objects that a pool child keeps for them: the runner and the database.
 
 A task is a notification without content; the work is claimed in the database. The worker's main process knows the tasks
 only by name: their code is loaded in the pool children.
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import structlog
 from celery import Task, current_app, shared_task, signals
 
-from service.queue.celery_app import GRADE_TASK, NO_SANDBOX, PLOT_TASK, TEST_RUN_TASK
+from service.queue.celery_app import EXPLAIN_TASK, GRADE_TASK, NO_SANDBOX, PLOT_TASK, TEST_RUN_TASK
 from service.queue.logs import configure_logging
 from service.settings import Settings, load_settings
 
@@ -112,7 +112,9 @@ def grade_notified_job(task: WarmTask) -> None:
     if outcome is GradingOutcome.GRADED:
         from service.queue.notifier import Notifier
 
-        Notifier(task.app, child.store, child.settings).plot()
+        notifier = Notifier(task.app, child.store, child.settings)
+        notifier.plot()
+        notifier.explain()
     elif outcome is GradingOutcome.HOST_FAULT:
         # The error may have damaged an object that is reused.
         _child_holder.drop()
@@ -143,6 +145,20 @@ def plot_notified_job(task: WarmTask) -> None:
     except Exception:
         # The row still marks them as due, so they are retried a limited number of times.
         _log.exception("plots.failed")
+
+
+@shared_task(bind=True, base=WarmTask, name=EXPLAIN_TASK)
+def explain_notified_grade(task: WarmTask) -> None:
+    """Search the causes of the lost marks of the next grade."""
+    from service.queue.explaining_job import explain_next_grade
+
+    child = task.child
+    with child.self_tester.busy():
+        try:
+            explain_next_grade(child.store, child.settings, child.runner)
+        except Exception:
+            # Grades that no one has claimed are notified again.
+            _log.exception("causes.failed")
 
 
 @signals.setup_logging.connect

@@ -26,6 +26,7 @@ from service.reports.verdict_sentences import (
 )
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
+from sim.sentences import join_sentences
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
 
 _PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
@@ -85,7 +86,9 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     if not causes:
         return diagnosis
     cause = min(causes, key=lambda each: _rank_cause(grade, indices[each.criterion], diagnosis))
-    is_general = diagnosis.next_step == describe_grade(grade, language).next_step
+    # The step about an error names the error, which is more than a rerun shows.
+    has_no_error = grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT)
+    is_general = has_no_error and diagnosis.next_step == describe_grade(grade, language).next_step
     return replace(
         diagnosis,
         next_step=format_cause_step(cause) if is_general else diagnosis.next_step,
@@ -111,8 +114,8 @@ def _rank_cause(grade: Grade, index: int, diagnosis: Diagnosis) -> tuple[bool, D
 
 
 def format_proof(cause: ShownCause) -> str:
-    """Return what reruns showed, in one line."""
-    return to_display_text(cause.text, 600)
+    """Return what reruns showed, with the note for staff, in one line."""
+    return to_display_text(join_sentences(cause.text, cause.staff_note), 800)
 
 
 def format_cause_step(cause: ShownCause) -> str:

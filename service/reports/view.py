@@ -122,7 +122,11 @@ def build_student_view(
         notes=_select_notes(grade, visible_ids),
         cost=None,  # the CPU limit depends on the number of trials, including hidden ones
         comments=tuple(each for each in grade.comments if visible_ids and each.criterion in ("", *visible_ids)),
-        causes=tuple(each for each in grade.causes if each.criterion in visible_ids and not each.for_staff),
+        causes=tuple(
+            replace(each, staff_note="")
+            for each in grade.causes
+            if each.criterion in visible_ids and not each.for_staff
+        ),
     )
     withheld = len(visible_grade.criteria) < len(grade.criteria) or len(visible_grade.trials) < len(grade.trials)
     return View(_translate(visible_grade, language), staff=False, withheld=withheld, language=language)

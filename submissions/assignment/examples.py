@@ -17,9 +17,10 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from sim.errors import UsageError
 from sim.recording import Verdict
-from submissions.assignment.folder import locate_assignment_folder
+from submissions.assignment.definition import Assignment
+from submissions.assignment.folder import REFERENCE, list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
-from submissions.assignment.reader import find_assignment, parse_toml
+from submissions.assignment.reader import find_assignment, find_in_catalogue, parse_toml
 from submissions.assignment.schema import Slug
 from submissions.assignment.table_problems import describe_problem
 from submissions.bundle import build_submission, read_submission
@@ -74,6 +75,14 @@ def locate_examples(assignment: str) -> Path:
     if not folder.is_dir():
         raise UsageError(f"There are no examples for {assignment!r}, expected the folder {folder}.")
     return folder
+
+
+def locate_catalogue_reference(assignment: Assignment) -> Path | None:
+    """Return the folder of the catalogue's reference solution; None if the assignment is another version."""
+    if assignment.id not in list_catalogue_ids() or find_in_catalogue(assignment.id).version != assignment.version:
+        return None
+    folder = locate_assignment_folder(assignment.id) / EXAMPLES / REFERENCE
+    return folder if folder.is_dir() else None
 
 
 def read_expected(assignment: str) -> ExpectedResults:

@@ -6,6 +6,7 @@ A sentence is made from the reruns of a cause. Neither the reference's text nor 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from types import MappingProxyType
 
@@ -42,29 +43,45 @@ _EFFECTS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def build_shown_causes(causes: Sequence[Cause], reveals: int = 0) -> tuple[ShownCause, ...]:
-    """Return the causes for reports, one for each criterion. Of those in hidden trials, students see ``reveals``."""
+def build_shown_causes(causes: Sequence[Cause], reveals: int = 0, revealed_before: int = 0) -> tuple[ShownCause, ...]:
+    """Return the causes for reports, one for each criterion.
+
+    A student sees ``reveals`` causes in hidden trials of an assignment; ``revealed_before`` are in other grades.
+    """
     shown_causes: list[ShownCause] = []
-    revealed_count = 0
+    revealed_count = revealed_before
     for criterion in dict.fromkeys(each.criterion for each in causes):
         group = [each for each in causes if each.criterion == criterion]
         text = join_sentences(*(describe_cause(each) for each in group))
         if not text:
             continue
-        is_hidden = any(each.is_hidden for each in group)
-        if is_hidden:
-            text = join_sentences(Sentence("In a hidden trial:"), text)
-            revealed_count += 1
-        shown_causes.append(
-            ShownCause(
-                criterion,
-                text,
-                describe_next_step(group[0]),
-                is_hidden and revealed_count > reveals,
-                _list_losing_files(group[0]),
+        shown_cause = ShownCause(criterion, text, describe_next_step(group[0]), files=_list_losing_files(group[0]))
+        if any(each.is_hidden for each in group):
+            is_revealed = revealed_count < reveals
+            revealed_count += is_revealed
+            shown_cause = replace(
+                shown_cause,
+                text=join_sentences(Sentence("In a hidden trial:"), text),
+                for_staff=not is_revealed,
+                is_hidden=True,
+                staff_note=_describe_visibility(is_revealed, revealed_count, reveals),
             )
-        )
+        shown_causes.append(shown_cause)
     return tuple(shown_causes)
+
+
+def _describe_visibility(is_revealed: bool, revealed_count: int, reveals: int) -> str:
+    if is_revealed:
+        return Sentence(
+            "The student sees this: %(count)s of %(reveals)s causes in hidden trials.",
+            count=revealed_count,
+            reveals=reveals,
+        )
+    return Sentence(
+        "Only staff see this: the student has seen %(count)s of %(reveals)s causes in hidden trials.",
+        count=revealed_count,
+        reveals=reveals,
+    )
 
 
 def describe_cause(cause: Cause) -> str:

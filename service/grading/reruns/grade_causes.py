@@ -28,6 +28,7 @@ def add_causes(
     reference: Submission | None = None,
     secret: SeedSource = PUBLIC_SECRET,
     reveals: int = 0,
+    revealed_before: int = 0,
     budget: Budget = DEFAULT_BUDGET,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> Grade:
@@ -41,6 +42,7 @@ def add_causes(
         reference: The reference solution, if there is one. It is used only if the assignment compares halves.
         secret: Where the seeds of the grade come from.
         reveals: How many causes in hidden trials the student may see. Staff see all.
+        revealed_before: How many of them are in other grades.
         budget: What the search for each criterion may cost.
         heartbeat: Called several times a second. It may raise an exception to stop the search.
 
@@ -63,4 +65,4 @@ def add_causes(
         causes += find_causes(engine, given_plan, budget=budget, explained=explained)
     order = {criterion.id: number for number, criterion in enumerate(assignment.criteria)}
     causes.sort(key=lambda cause: order[cause.criterion])
-    return replace(grade, causes=build_shown_causes(causes, reveals))
+    return replace(grade, causes=build_shown_causes(causes, reveals, revealed_before))

@@ -12,9 +12,12 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.store.courses.assignment_versions import assignment_from_bytes
+from service.store.states import Role
 from service.store.tables.courses import AssignmentVersion
+from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 from sim.errors import HostError, UsageError
+from submissions.assignment.folder import REFERENCE
 from submissions.grading_request import GradingRequest
 from submissions.stored_submission import unpack_submission
 from submissions.submission import Submission
@@ -61,6 +64,23 @@ def load_assignment(session: Session, job_id: str) -> Assignment:
     """Return the assignment version of a job; raises like ``load_grading_request``."""
     query = select(AssignmentVersion.content).join(Job, Job.assignment_version_id == AssignmentVersion.id)
     return _unpack_stored(assignment_from_bytes, session.scalar(query.where(Job.id == job_id)), "assignment", job_id)
+
+
+def load_reference(session: Session, job_id: str) -> Submission | None:
+    """Return the newest reference solution that staff submitted for the assignment version of a job; None without."""
+    version = select(Job.assignment_version_id).where(Job.id == job_id).scalar_subquery()
+    query = (
+        select(SubmissionRow.packed)
+        .join(Job, Job.submission_id == SubmissionRow.id)
+        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+        .where(
+            Job.assignment_version_id == version,
+            SubmissionRow.source == REFERENCE,
+            Enrolment.role == Role.INSTRUCTOR,
+        )
+    )
+    packed = session.scalar(query.order_by(SubmissionRow.id.desc()).limit(1))
+    return None if packed is None else _unpack_stored(unpack_submission, packed, "reference solution", job_id)
 
 
 def _unpack_stored(decode_content: Callable[[bytes], Read], content: bytes | None, subject: str, job_id: str) -> Read:

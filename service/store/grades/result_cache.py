@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from service.store import phases
 from service.store.grades import current_grades
+from service.store.grades.causes import CAUSES_NAME
 from service.store.states import PlotState
 from service.store.tables.courses import AssignmentVersion
 from service.store.tables.grades import Artifact, CriterionResultRow, TrialRow
@@ -79,6 +80,9 @@ def copy_rows(session: Session, source_id: str, job_id: str) -> None:
         columns = table.__table__.columns
         copied_columns = [column for column in columns if column.name not in ("id", "job_id")]
         rows = select(literal(job_id), *copied_columns).where(columns["job_id"] == source_id)
+        if table is Artifact:
+            # What causes reveal of hidden trials is counted for each student.
+            rows = rows.where(columns["name"] != CAUSES_NAME)
         session.execute(insert(table).from_select(["job_id", *(column.name for column in copied_columns)], rows))
 
 

@@ -32,7 +32,7 @@ from service.grading.grade import (
 )
 from service.store import artifacts
 from service.store.codec import decode, encode
-from service.store.grades import comments, overrides
+from service.store.grades import causes, comments, overrides
 from service.store.grades.grade_sentences import restore_sentences
 from service.store.grades.overrides import OverrideLine
 from service.store.grades.recording_texts import texts_from_bytes
@@ -46,6 +46,7 @@ from sim.recording_values import collect_faults
 from submissions.seeds import PUBLIC_SECRET
 
 _RECORDING = "application/x-robomark-recording"
+_NO_CAUSES = causes.StoredCauses(())
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +152,22 @@ def _require_grade(loaded_grades: _LoadedGrades, job_id: str) -> Grade:
 
 
 def _apply_staff_changes(session: Session, job_ids: Collection[str], loaded_grades: _LoadedGrades) -> _LoadedGrades:
-    overrides_by_job, comments_by_job = (
+    overrides_by_job, comments_by_job, causes_by_job = (
         overrides.load_overrides(session, job_ids),
         comments.load_comments_by_job(session, job_ids),
+        causes.load_causes(session, job_ids),
     )
     for job_id, grade in loaded_grades:
         written_comments = tuple(WrittenComment(each.criterion, each.text) for each in comments_by_job.get(job_id, ()))
-        yield job_id, replace(_apply_overrides(grade, overrides_by_job.get(job_id, {})), comments=written_comments)
+        stored_causes = causes_by_job.get(job_id, _NO_CAUSES)
+        yield (
+            job_id,
+            replace(
+                _apply_overrides(grade, overrides_by_job.get(job_id, {})),
+                comments=written_comments,
+                causes=stored_causes.causes,
+            ),
+        )
 
 
 def _apply_overrides(grade: Grade, overrides_by_criterion: Mapping[str, OverrideLine]) -> Grade:

@@ -19,6 +19,7 @@ from service.web.context import Context
 from service.web.request_bodies import takes_upload
 from submissions.assignment.assignment_overview import read_overview
 from submissions.assignment.definition import Assignment
+from submissions.assignment.examples import locate_catalogue_reference
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.assignment.reader import find_in_catalogue
 
@@ -304,5 +305,5 @@ def _build_assignment_fields(assignment: Assignment) -> dict[str, Any]:
             )
             for each in assignment.scenarios
         ],
-        "has_reference": assignment_uploads.find_reference_solution(assignment) is not None,
+        "has_reference": locate_catalogue_reference(assignment) is not None,
     }

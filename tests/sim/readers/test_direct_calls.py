@@ -89,6 +89,7 @@ _ALLOWED = {
         "service/store/courses/assignment_versions.py",
         "zlib.decompress",
     ): "an assignment that was read within its limits",
+    ("service/store/grades/causes.py", "json.loads"): _STORED,
     ("service/store/grades/judged_again.py", "json.loads"): _STORED,
     ("service/store/grades/recording_texts.py", "json.loads"): _STORED,
     ("service/store/grades/recording_texts.py", "zipfile.ZipFile"): _STORED,
