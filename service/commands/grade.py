@@ -43,6 +43,10 @@ def grade(
     all_trials: Annotated[
         bool, typer.Option("--all-trials", help="Run all trials of pools, so that no marks are provisional.")
     ] = False,
+    nearest: Annotated[
+        bool,
+        typer.Option("--nearest", help="For staff: also search for the smallest change of a number that passes."),
+    ] = False,
     channel: ChannelFlags,
     unsafe: Annotated[
         bool, typer.Option("--unsafe-no-sandbox", help="Run submissions without a sandbox. For development only.")
@@ -68,4 +72,5 @@ def grade(
         extent=extent,
         causes=causes,
         unsafe=unsafe,
+        nearest=nearest,
     )

@@ -14,6 +14,12 @@ from pathlib import Path
 
 from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
+from service.commands.nearest_numbers import (
+    NEAREST_FORMATS,
+    print_json_with_nearest,
+    print_nearest,
+    search_lost_criteria,
+)
 from service.commands.options import apply_channel_flags
 from service.commands.output import print_note, print_renderables
 from service.commands.sandbox_warning import warn_about_missing_sandbox
@@ -52,6 +58,7 @@ def grade_all(
     extent: PoolExtent,
     causes: bool,
     unsafe: bool,
+    nearest: bool,
 ) -> None:
     """Grade the submissions and print the results, one by one or in one document.
 
@@ -66,11 +73,14 @@ def grade_all(
         extent: How many trials of pools are run.
         causes: Show the causes of lost marks, by running trials again.
         unsafe: Run student code without the sandbox.
+        nearest: Search for the smallest change of a number with which lost criteria pass.
 
     Raises:
         HostError: At least one submission could not be graded.
         UsageError: At least one submission was rejected, and all others were graded.
     """
+    if nearest and (len(submissions) > 1 or form not in NEAREST_FORMATS):
+        raise UsageError("--nearest needs one submission, and the format text or json")
     # Read the assignment first: a mistake in it is not an error of a submission.
     named_definition = None if assignment is None else find_assignment(assignment)
     output_format = FORMATS[form]
@@ -95,6 +105,11 @@ def grade_all(
                 submission = _select_run(submission, run)
                 graded_definition = _apply_to_scenarios(definition, channel_flags)
                 grade = grade_submission(submission, graded_definition, secret=secret, runner=runner, extent=extent)
+                searches = (
+                    search_lost_criteria(submission, graded_definition, grade, runner, secret, extent)
+                    if nearest
+                    else ()
+                )
                 if causes:
                     grade = add_causes(
                         grade,
@@ -121,8 +136,12 @@ def grade_all(
                     worst_error if worst_error is not None and not isinstance(worst_error, UsageError) else error
                 )
                 continue
-            if render_table is None:
+            if nearest and form == "json":
+                print_json_with_nearest(grade, submission, searches)
+            elif render_table is None:
                 _print_grade(output_format, grade, submission)
+            if nearest and form == "text":
+                print_nearest(grade, searches)
             missing = describe_missing_part(grade.missing)
             rows.append(TableRow(Student(grade.student), str(path), grade.assignment, grade, missing))
             if report is not None:

@@ -60,10 +60,53 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
     failure = describe_first_failure(clues, criterion)
     if not failure:  # only hidden trials lost marks
         return
+    trials = _collect_path_trials(clues, criterion, listing)
+    if not trials:
+        return
+    best = _find_best_change(clues, criterion, trials, listing)
+    if best is not None:
+        yield _describe_change(*best, failure)
+        return
+    ticks = sum(len(each.recording.ticks) for each in trials)
+    for first, second, order in _collect_exchanges(listing, trials)[: min(_MAX_LINES, _MAX_TICKS // max(ticks, 1))]:
+        exchanged = [replace(each, recording=_reorder_motion(each.recording, order)) for each in trials]
+        if _has_full_marks(criterion, clues, exchanged):
+            yield Sentence(
+                "%(place)s: %(problem)s. Lines %(line)s and %(other_line)s are in the wrong order: exchange them",
+                place=listing.locate(first.line),
+                problem=make_clause(failure),
+                line=first.line,
+                other_line=second.line,
+            )
+            return
+
+
+def find_scaled_line(clues: Clues, criterion_id: str) -> tuple[str, int, float] | None:
+    """Return a file, a line and the factor of its motion with which the recorded path would meet the criterion.
+
+    The factor is negative for the opposite direction. None if the search does not apply, or finds none.
+    """
+    listing = next(iter(clues.programs), None)
+    criterion = next((each for each in clues.lost if each.id == criterion_id), None)
+    if listing is None or not isinstance(criterion, _PATH_CRITERIA) or clues.definition is None:
+        return None
+    best = _find_best_change(clues, criterion, _collect_path_trials(clues, criterion, listing), listing)
+    return None if best is None else (listing.name, best[0].statement.line, best[1])
+
+
+def _collect_path_trials(clues: Clues, criterion: Criterion, listing: Listing) -> list[TrialResult]:
+    """Return the visible trials of the criterion; empty if their paths depend on more than the program's numbers."""
     trials = [each for each in clues.shown if not criterion.scenarios or each.scenario in criterion.scenarios]
     is_unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
-    if not trials or is_unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements):
-        return
+    return [] if is_unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements) else trials
+
+
+def _find_best_change(
+    clues: Clues, criterion: Criterion, trials: list[TrialResult], listing: Listing
+) -> tuple[_Change, float] | None:
+    """Return the change and the factor with full marks for the criterion that gives the most marks together."""
+    if not trials or clues.definition is None:
+        return None
     visible_criteria = [each for each in clues.definition.criteria if each.visibility == "visible"]
     path_criteria = [each for each in visible_criteria if isinstance(each, _PATH_CRITERIA)]
     remaining_ticks = _MAX_TICKS
@@ -84,20 +127,7 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
         size = abs(math.log(abs(factor))) + (factor < 0)
         if best is None or (-total, size) < best[:2]:
             best = -total, size, change, factor
-    if best is not None:
-        yield _describe_change(best[2], best[3], failure)
-        return
-    for first, second, order in _collect_exchanges(listing, trials)[: min(_MAX_LINES, _MAX_TICKS // max(ticks, 1))]:
-        exchanged = [replace(each, recording=_reorder_motion(each.recording, order)) for each in trials]
-        if _has_full_marks(criterion, clues, exchanged):
-            yield Sentence(
-                "%(place)s: %(problem)s. Lines %(line)s and %(other_line)s are in the wrong order: exchange them",
-                place=listing.locate(first.line),
-                problem=make_clause(failure),
-                line=first.line,
-                other_line=second.line,
-            )
-            return
+    return None if best is None else best[2:]
 
 
 def _choose_factor(passing_factors: list[float]) -> float:

@@ -93,6 +93,10 @@ class SourceTree:
         """Return the number of the line, from 1, at an offset."""
         return sum(start <= offset for start in self._line_starts)
 
+    def find_line_start(self, line: int) -> int:
+        """Return the offset at which a line, from 1, starts."""
+        return self._line_starts[line - 1]
+
     def replace(self, node: ast.expr | ast.stmt, new: str) -> Edit:
         """Return the edit that replaces a node."""
         return Edit(*self.locate(node), new)
