@@ -3,7 +3,7 @@
 
 count = 1
 
-while count < 5:
+while count < 2:
     say(str(count))
     count = count + 1
 
