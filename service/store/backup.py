@@ -8,14 +8,14 @@ from __future__ import annotations
 import os
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Column, Engine, Table, bindparam, delete, func, insert, select, text, update
-from sqlalchemy.engine import Connection
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.engine import Connection, RowMapping
+from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 
 from service.store.engine import open_engine
 from service.store.migrate import upgrade_database
@@ -28,7 +28,14 @@ from sim.errors import HostError, UsageError
 
 #: Small, because some rows contain a recording.
 _ROWS_AT_A_TIME = 50
+#: Errors of SQLAlchemy and of the types of columns while rows of a damaged file are read.
+_READ_ERRORS = (SQLAlchemyError, ArithmeticError, LookupError, TypeError, ValueError)
+_MAX_REASON_LENGTH = 120
 _EXPECTED = "expected a file that robomark db backup made"
+
+
+class _UnreadableRowError(Exception):
+    """A row of the source cannot be read."""
 
 
 def back_up(source: Engine, file: Path) -> None:
@@ -50,7 +57,7 @@ def back_up(source: Engine, file: Path) -> None:
             with _open_file(file) as target:
                 upgrade_database(target)
                 _copy_rows(source, target)
-    except (OSError, sqlite3.Error, OperationalError) as error:
+    except (OSError, sqlite3.Error, OperationalError, _UnreadableRowError) as error:
         file.unlink(missing_ok=True)
         raise HostError(f"the database cannot be copied to {file}: {error}") from None
     except BaseException:
@@ -78,12 +85,23 @@ def restore(file: Path, target: Engine) -> None:
                 f"{file}: cannot be read ({error}), expected a file that robomark db backup made"
             ) from None
         with _open_file(snapshot) as source:
-            _check_objects(source, file)
-            if load_current_revision(source) is None:
-                raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
-            upgrade_database(source)
-            _check_usability(source, file)
-            _copy_rows(source, target)
+            try:
+                _prepare_source(source, file)
+            except _READ_ERRORS as error:
+                raise UsageError(f"{file}: is damaged ({_describe_error(error)}), {_EXPECTED}") from None
+            try:
+                _copy_rows(source, target)
+            except (_UnreadableRowError, IntegrityError, DataError) as error:
+                raise UsageError(f"{file}: is damaged ({_describe_error(error)}), {_EXPECTED}") from None
+
+
+def _prepare_source(source: Engine, file: Path) -> None:
+    """Upgrade the copy of a backup to this release. Raises UsageError if it is none, or one of ``_READ_ERRORS``."""
+    _check_objects(source, file)
+    if load_current_revision(source) is None:
+        raise UsageError(f"{file}: is no database of Robomark's, {_EXPECTED}")
+    upgrade_database(source)
+    _check_usability(source, file)
 
 
 def _check_objects(source: Engine, file: Path) -> None:
@@ -154,8 +172,7 @@ def _copy_table(table: Table, source_connection: Connection, target_connection: 
     ]
     reference_rows: list[dict[str, Any]] = []
     (key,) = table.primary_key.columns
-    all_rows = source_connection.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table))
-    for chunk in all_rows.mappings().partitions():
+    for chunk in _read_chunks(table, source_connection):
         target_connection.execute(insert(table), [_clear_columns(row, self_references) for row in chunk])
         reference_rows += [
             {"of": row[key.name], **{column.name: row[column.name] for column in self_references}}
@@ -170,6 +187,22 @@ def _copy_table(table: Table, source_connection: Connection, target_connection: 
         # New rows get the next free numbers.
         sequence = func.pg_get_serial_sequence(table.name, key.name)
         target_connection.execute(select(func.setval(sequence, last_key)))
+
+
+def _read_chunks(table: Table, connection: Connection) -> Iterator[Sequence[RowMapping]]:
+    """Yield the rows of a table. Raises _UnreadableRowError."""
+    try:
+        rows = connection.execution_options(yield_per=_ROWS_AT_A_TIME).execute(select(table)).mappings()
+        while chunk := rows.fetchmany(_ROWS_AT_A_TIME):
+            yield chunk
+    except _READ_ERRORS as error:
+        raise _UnreadableRowError(f"{table.name}: {_describe_error(error)}") from None
+
+
+def _describe_error(error: Exception) -> str:
+    """Return the reason in one line, without the statement that SQLAlchemy adds."""
+    reason = str(error.orig if isinstance(error, DBAPIError) else error)
+    return " ".join(reason.split())[:_MAX_REASON_LENGTH]
 
 
 def _clear_columns(row: Mapping[Any, Any], columns: list[Column[Any]]) -> dict[str, Any]:

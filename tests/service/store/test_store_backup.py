@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -150,6 +151,10 @@ def test_a_backup_of_a_newer_release_is_refused_and_leaves_nothing(tmp_path: Pat
         ),
         ("CREATE TRIGGER later AFTER INSERT ON course BEGIN DELETE FROM job; END", "trigger"),
         ("DELETE FROM installation", "is damaged"),
+        ("UPDATE installation SET secret = CAST(x'ff' AS TEXT)", "is damaged"),
+        ("UPDATE installation SET made_at = 'yesterday'", "is damaged"),
+        ("DROP TABLE statement_head", "is damaged"),
+        ("INSERT INTO person (id, created_at, operator) VALUES (1, CAST(x'fe' AS TEXT), 0)", "is damaged .person: "),
         ("UPDATE schema_compatibility SET oldest_compatible = '9999'", "is damaged"),
     ],
 )
@@ -163,6 +168,17 @@ def test_a_changed_backup_is_refused(statement: str, words: str, tmp_path: Path)
         engine.dispose()
         with pytest.raises(UsageError, match=f"copy.db: .*{words}.*expected a file that robomark db backup made"):
             restore(copy, store.engine)
+
+
+def test_a_backup_with_damaged_pages_is_refused_or_restored(tmp_path: Path) -> None:
+    copy = tmp_path / "copy.db"
+    with open_store(settings_in(tmp_path / "home")) as store:
+        back_up(store.engine, copy)
+        content = copy.read_bytes()
+        for start in range(100, 20_000, 2_000):
+            copy.write_bytes(content[:start] + b"\xa5" * 1_000 + content[start + 1_000 :])
+            with contextlib.suppress(UsageError, HostError):
+                restore(copy, store.engine)
 
 
 def _counts(store: Store) -> dict[str, int]:
