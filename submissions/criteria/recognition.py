@@ -42,11 +42,11 @@ class Recognition(Criterion):
     On an instructor's own image, ``greys`` defines the label patches: ``"shapes"`` or ``"digits"`` as in the course, or
     the grey level of each label.
 
-    The answer is at ``answer`` in the JSON of the reply, or otherwise in the text of the reply. With ``answer_from``,
-    it is in the robot's speech or printed text before the next image. Case, hyphens and ``aliases`` (label to other
-    names) are ignored. An answer that contains two different labels is wrong. ``confidence`` is the place of a number
-    from 0 to 1 in the JSON, which is shown but not marked. With ``late = "wrong"``, an answer is wrong if it arrives
-    after the next image or after the robot's end.
+    The answer is the text or number at ``answer`` in the JSON of the reply; without ``answer``, it is in the text of
+    the reply. With ``answer_from``, it is in the robot's speech or printed text before the next image. Case, hyphens
+    and ``aliases`` (label to other names) are ignored. An answer that contains two different labels is wrong.
+    ``confidence`` is the place of a number from 0 to 1 in the JSON, which is shown but not marked. With ``late =
+    "wrong"``, an answer is wrong if it arrives after the next image or after the robot's end.
 
     ``images`` selects the images of a trial that count. Images of the same object from the same place count as one,
     decided by the majority of the answers. With ``each_pattern``, all images of one pattern count as one, from any

@@ -25,7 +25,7 @@ from service.grading.grade import (
     TrialResult,
     VisibleFeedback,
 )
-from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
+from service.grading.judging.answers import as_text, find_at_path, parse_json_answer
 from service.grading.judging.geometry import Side
 from service.grading.judging.image_replies import Reply, ReplyStatus, collect_replies
 from service.grading.judging.judge_declaration import IndexedTrials
@@ -292,7 +292,14 @@ def _read_answer(
             confidence = _parse_probability(find_at_path(value, criterion.confidence))
         if criterion.answer is not None:
             answer_value = find_at_path(value, criterion.answer)
-            text = text if answer_value is MISSING else as_text(answer_value)
+            if isinstance(answer_value, bool) or not isinstance(answer_value, str | int | float):
+                problem = Sentence(
+                    "the answer has no text or number at %(path)s: %(answer)s",
+                    path=criterion.answer,
+                    answer=quote_text(text),
+                )
+                return None, problem, confidence, None
+            text = as_text(answer_value)
     found_labels = finder.find_labels(text)
     if not found_labels:
         return None, Sentence("the answer names no label: %(answer)s", answer=quote_text(text)), confidence, text

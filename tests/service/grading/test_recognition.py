@@ -398,6 +398,25 @@ def test_confidence_is_averaged_apart_for_right_and_wrong() -> None:
     assert accuracy(judged(build_criterion(answer="shape"), recording)).confidence is None
 
 
+@pytest.mark.parametrize(
+    ("reply", "is_right"),
+    [
+        ('JSON::{"message": {"shape": "square"}}', True),
+        ('JSON::{"message": {"shape": "square", "report": "diamond or square"}}', True),
+        ('JSON::{"message": {"form": "square"}}', False),
+        ('JSON::{"shape": "square"}', False),
+        ('JSON::{"message": {"shape": ["square"]}}', False),
+        ('JSON::{"message": {"shape": {"name": "square"}}}', False),
+        ('{"message": {"shape": "square"}}', False),
+        ("square", False),
+    ],
+)
+def test_an_answer_must_be_at_its_place_in_the_json(reply: str, is_right: bool) -> None:
+    result = judged(build_criterion(answer="message.shape"), talk(("square", reply)))
+    assert result.evidence[0].passed == is_right
+    assert ("the answer has no text or number at message.shape" in result.message) == (not is_right)
+
+
 @pytest.mark.parametrize(("right", "marks"), [(0, "0"), (4, "0"), (5, "2"), (8, "2"), (9, "4"), (10, "4")])
 def test_marks_by_steps(right: int, marks: str) -> None:
     answers = [("square", "square" if number < right else "diamond") for number in range(10)]
