@@ -91,17 +91,21 @@ def _training(runner: TrialRunner, _: Path) -> str:
 
 
 def _check(runner: TrialRunner, folder: Path) -> str:
+    criteria, parts = "", ((0, 0), (0, 400), (1, 0), (1, 400))
+    for number, (part, start) in enumerate(parts):
+        says = f"{{'passed': True, 'message': repr(told()[{part}])[{start}:{start + 400}]}}"
+        (folder / f"check{number}.py").write_text(f"{TOLD}def check(trial):\n    return {says}\n")
+        criteria += (
+            f'[[criterion]]\nid = "c{number}"\ntitle = "C"\nmarks = 4\ncheck = "python"\nfile = "check{number}.py"\n'
+        )
     (folder / "assignment.toml").write_text(
         'id = "a"\ntitle = "A"\n[parts]\nresponder = "none"\n[[scenario]]\nid = "s"\nposes = [[100, 800, 0]]\n'
-        'seconds = 5\n[[criterion]]\nid = "c"\ntitle = "C"\nmarks = 4\ncheck = "python"\nfile = "check.py"\n'
+        f"seconds = 5\n{criteria}"
     )
-    says = "def check(trial):\n    return {'passed': True, 'message': repr(told()[PART])[START:START + 400]}\n"
-    parts = []
-    for part, start in ((0, 0), (0, 400), (1, 0), (1, 400)):
-        (folder / "check.py").write_text(TOLD + says.replace("PART", str(part)).replace("START", str(start)))
-        submission = Submission("ada", SourceFile("robot.py", "say('x')"))
-        parts.append(grade(submission, read_assignment(folder), runner=runner).criteria[0].evidence[0].message)
-    return repr([parts[:2], parts[2:]])
+    submission = Submission("ada", SourceFile("robot.py", "say('x')"))
+    given = grade(submission, read_assignment(folder), runner=runner)
+    messages = [each.evidence[0].message for each in given.criteria]
+    return repr([messages[:2], messages[2:]])
 
 
 KINDS: dict[str, Callable[[TrialRunner, Path], str]] = {
