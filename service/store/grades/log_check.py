@@ -37,6 +37,7 @@ _SUBMISSION_PARTS = (
     "version of the assignment",
     "attempt",
     "time of submission",
+    "time of publication",
     "submission",
 )
 _MARKS_KINDS = (FactKind.TOTAL, FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
@@ -76,6 +77,7 @@ class _Entry:
     problem: str  # of its content by itself
     change: Any = None
     issued_at: Any = None
+    published_at: Any = None
     erased: tuple[int, ...] = ()
     commitments: Mapping[str, Any] = field(default_factory=dict)
     submission: tuple[Any, ...] = (None,) * len(_SUBMISSION_PARTS)
@@ -151,6 +153,8 @@ def _load_entries(session: Session, filed_leaves: Mapping[int, bytes], keys: Map
             problem = "was altered: its content is not that of its hash"
         elif statement.predicate.get("entry") != number:
             problem = "was moved: its statement has another number"
+        elif statement.predicate.get("grade") != job_id or (submission_id is None) != (job_id is None):
+            problem = "was altered: it refers to another grade than its statement"
         elif filed_leaves.get(number) != leaf:
             problem = _check_signature(envelope, keys.get(envelope.key_id))
         yield _Entry(*head, is_empty=False, problem=problem, **_summarise(statement))
@@ -165,6 +169,7 @@ def _summarise(statement: Statement) -> dict[str, Any]:
     return {
         "change": predicate.get("change"),
         "issued_at": predicate.get("issued_at"),
+        "published_at": predicate.get("published_at"),
         "erased": tuple(each for each in erased if type(each) is int) if isinstance(erased, list) else (),
         "commitments": {kind: listed.get(kind) for kind in _MARKS_KINDS},
         "submission": (
@@ -173,6 +178,7 @@ def _summarise(statement: Statement) -> dict[str, Any]:
             assignment.get("version"),
             predicate.get("attempt"),
             predicate.get("submitted_at"),
+            predicate.get("published_at"),
             statement.subjects.get("submission"),
         ),
     }
@@ -262,7 +268,8 @@ def _check_grades(session: Session, entries: Sequence[_Entry], findings: _Findin
     is_published = (Job.standing == Standing.STANDS, Job.published_at.is_not(None), Job.state == JobState.DONE)
     query = select(Job.id, Job.submission_id, Job.published_at).where(*is_published).order_by(Job.id)
     published_jobs = session.execute(query).all()
-    log_start = entries[0].made_at if entries else ""
+    # The first grades were published a moment before their entries.
+    log_start = min(entries[0].made_at, str(entries[0].published_at or entries[0].made_at)) if entries else ""
     older_grades, stated_jobs = 0, []
     for job_id, submission_id, published_at in published_jobs:
         entry = newest_entries.pop(submission_id, None)
@@ -289,15 +296,15 @@ def _compare_submissions(session: Session, entries_by_job: Mapping[str, _Entry],
     """Name grades that are now of another student or submission than in their statements."""
     query = (
         select(Job.id, Job.enrolment_id == SubmissionRow.enrolment_id, SubmissionRow, Enrolment.student)
-        .add_columns(AssignmentVersion.assignment, AssignmentVersion.version)
+        .add_columns(AssignmentVersion.assignment, AssignmentVersion.version, Job.published_at)
         .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
         .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
         .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
         .where(Job.id.in_(entries_by_job))
     )
-    for job_id, is_own, row, student, assignment, version in session.execute(query):
-        submitted_at = format_moment(row.submitted_at or row.created_at)
-        actual = (student, assignment, version, row.attempt, submitted_at, row.sha256)
+    for job_id, is_own, row, student, assignment, version, published_at in session.execute(query):
+        times = (format_moment(row.submitted_at or row.created_at), format_moment(published_at))
+        actual = (student, assignment, version, row.attempt, *times, row.sha256)
         entry = entries_by_job[job_id]
         pairs = zip(_SUBMISSION_PARTS, actual, entry.submission, strict=True)
         changed = [name for name, now, stated in pairs if now != stated]

@@ -253,6 +253,10 @@ def _set_submission(**values: Any) -> Callable[[Session, str], None]:
     return change
 
 
+def _detach_entry(session: Session, job_id: str) -> None:
+    session.execute(update(StatementEntry).where(StatementEntry.job_id == job_id).values(submission_id=None))
+
+
 TAMPERINGS: dict[str, tuple[Callable[[Session, str], None], str]] = {
     "total changed": (_change_marks, "its total is not that of entry 2"),
     "criterion changed": (_change_criterion, f"its criterion {GRADE.criteria[0].id} is not that of entry 2"),
@@ -260,6 +264,7 @@ TAMPERINGS: dict[str, tuple[Callable[[Session, str], None], str]] = {
     "grade unpublished": (_unpublish, "of entry 2 was removed, or is no longer published"),
     "entry removed": (_remove_entry, "entry 2 was removed"),
     "statement forged": (_forge_statement, "entry 2 is not the one that was filed"),
+    "entry detached": (_detach_entry, "entry 2 was altered: it refers to another grade than its statement"),
     "back-dated": (_back_date, "entry 2 was altered: its time is not that of its statement"),
 }
 
@@ -303,12 +308,17 @@ def test_a_head_without_its_hashes_says_that_history_differs(store: Store, publi
     assert finding.sentence.startswith("the first 5 entries are not those of the head")
 
 
+def _back_date_publication(session: Session, job_id: str) -> None:
+    session.execute(update(Job).where(Job.id == job_id).values(published_at=datetime(2020, 1, 1, tzinfo=UTC)))
+
+
 MOVES: dict[str, Callable[[Session, str], None]] = {
     "student": _rename_student,
     "student ": _move_submission,
     "student  ": _show_elsewhere,
     "attempt": _set_submission(attempt=7),
     "submission": _set_submission(sha256="0" * 64),
+    "time of publication": _back_date_publication,
     "time of submission": _set_submission(submitted_at=datetime(2020, 1, 1, tzinfo=UTC)),
 }
 
@@ -334,6 +344,17 @@ def test_an_entry_between_two_heads_of_the_same_size_is_compared_with_both(store
         _rewrite_entry(row, entries.ensure_signing_key(session), issued_at=early_head.issued_at)
     for heads in ((early_head, late_head), (late_head, early_head)):
         assert "entry 4 was back-dated" in _check(store, *heads).findings[0].sentence
+
+
+def test_a_first_grade_without_an_entry_is_named(store: Store, published: Published) -> None:
+    with store.transaction() as session:
+        # The grades of one publication have the same time, which is before the log's first entry.
+        first_time = session.scalars(select(Job.published_at).where(Job.id == published.jobs["ada"])).one()
+        session.execute(update(Job).where(Job.id == published.jobs["dee"]).values(published_at=first_time))
+        session.execute(delete(StatementEntry).where(StatementEntry.job_id == published.jobs["dee"]))
+    report = _check(store)
+    assert report.older_grades == 0
+    assert report.findings[0].sentence.endswith("is published without a statement")
 
 
 def test_a_gap_of_any_size_is_named(store: Store, published: Published) -> None:
