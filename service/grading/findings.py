@@ -86,10 +86,14 @@ class MissingAnswer(Finding):
 
 @dataclass(frozen=True, slots=True)
 class FailedCall(Finding):
-    """A visible call of a function that returned no value to compare; ``fault`` is None if it has another form."""
+    """A visible call of a function that returned no value to compare; ``fault`` is None if it has another form.
+
+    ``returned`` is its value then.
+    """
 
     function: str
     fault: Fault | None
+    returned: object = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ def hint_about_other_keys(clues: Clues) -> Iterator[str]:
         for answer in clues.answers if path else ():
             sibling_keys = _list_sibling_keys(answer, path)
             if sibling_keys and not any(expected_key in _list_sibling_keys(each, path) for each in clues.answers):
-                line = _describe_key_line(sibling_keys, clues) or describe_return_line(answer, clues, RETURN_LINE)
+                line = describe_key_line(sibling_keys, clues) or describe_return_line(answer, clues, RETURN_LINE)
                 yield Sentence(
                     "%(place)s: the answer has %(keys)s; expected the key %(expected)s",
                     place=line,
@@ -71,7 +71,7 @@ def hint_about_missing_key(clues: Clues) -> Iterator[str]:
     similar_key = next(
         (each for each in answer_keys if each.casefold() in similar_keys and f'"{each}"' not in clues.task), ""
     )
-    line = _describe_key_line([similar_key], clues) if similar_key and key not in answer_keys else ""
+    line = describe_key_line([similar_key], clues) if similar_key and key not in answer_keys else ""
     if line:
         yield Sentence(
             "%(place)s answers the key %(key)s; the assignment requires %(required)s. Write %(required)s",
@@ -117,7 +117,7 @@ def hint_about_answer_values(clues: Clues) -> Iterator[str]:
         answer = clues.find_finding(criterion, OtherAnswer) if path else None
         location = ""
         if answer is not None:
-            location = _describe_words_line(answer.text, clues) or _describe_key_line([path.rpartition(".")[2]], clues)
+            location = _describe_words_line(answer.text, clues) or describe_key_line([path.rpartition(".")[2]], clues)
         if answer is None or not location or not isinstance(criterion, Replies):
             continue
         expected = next((each for each in criterion.expect.values() if str(each).endswith(answer.text)), "")
@@ -141,13 +141,13 @@ def _describe_value_difference(criterion: Replies, clues: Clues) -> str:
     for recording in clues.recordings:
         for message in recording.messages if not criterion.agents else ():
             question = recording.messages[message.reply_to].text if message.reply_to is not None else ""
-            expected, value = criterion.expect.get(question), _parse_answer(message.text)
+            expected, value = criterion.expect.get(question), parse_answer(message.text)
             for key in path.split("."):
                 value = value.get(key) if isinstance(value, dict) else None
             if not isinstance(value, str) or expected is None or value == expected:
                 continue
             advice = advise_on_difference(expected, value)
-            location = _describe_words_line(value, clues) or _describe_key_line([path.rpartition(".")[2]], clues)
+            location = _describe_words_line(value, clues) or describe_key_line([path.rpartition(".")[2]], clues)
             if not advice or not location:
                 return ""
             answer = quote_text(value)
@@ -165,7 +165,7 @@ def hint_about_shifted_numbers(clues: Clues) -> Iterator[str]:
         if failure_count < _MIN_SHIFTED_ANSWERS or len(pairs) != 1:
             continue
         key, shift = pairs.pop()
-        location = _describe_key_line([key], clues)
+        location = describe_key_line([key], clues)
         if location and shift:
             template = (
                 translatable(
@@ -203,7 +203,7 @@ def hint_about_swapped_values(clues: Clues) -> Iterator[str]:
                 return
             if other_key is None or key not in values or str(values[key]) == number:
                 continue
-            location = _describe_key_line([key], clues)
+            location = describe_key_line([key], clues)
             if location:
                 yield Sentence(
                     "%(place)s: %(key)s is %(value)s; expected %(expected)s, which %(other_key)s has. Check the values "
@@ -232,7 +232,7 @@ def hint_about_text_numbers(clues: Clues) -> Iterator[str]:
             yield Sentence(
                 "%(place)s sends %(key)s as the text %(text)s, and %(program_place)s compares it with a number. Write "
                 "int(...) around the text",
-                place=_describe_key_line([key], clues) or "responder.py",
+                place=describe_key_line([key], clues) or "responder.py",
                 key=quote_text(key),
                 text=quote_text(match[2]),
                 program_place=listing.locate(listing.find_line(pattern)),
@@ -266,7 +266,7 @@ def hint_about_quoted_object(clues: Clues) -> Iterator[str]:
             quoted = re.compile(rf"""['"]{match[1]}['"]: ['"]\{match[2]}""") if match is not None else None
             if match is None or quoted is None or not any(quoted.search(each) for each in clues.answers):
                 continue
-            location = _describe_key_line([match[1]], clues)
+            location = describe_key_line([match[1]], clues)
             if location:
                 yield Sentence(
                     "%(place)s: the value of %(key)s is a text, and not the object in it. Make the object with "
@@ -305,7 +305,7 @@ def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
         answer_keys = {key for answer in clues.answers for key in _KEY.findall(answer)}
         for key in sorted(expected_keys - answer_keys):
             similar_keys = difflib.get_close_matches(key, sorted(answer_keys - expected_keys), 1, _MIN_SIMILARITY)
-            line = _describe_key_line(similar_keys, clues) if similar_keys else ""
+            line = describe_key_line(similar_keys, clues) if similar_keys else ""
             if line:
                 yield Sentence(
                     "%(place)s writes the key %(key)s; expected %(expected)s",
@@ -318,7 +318,7 @@ def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
 
 def _list_sibling_keys(answer: str, path: str) -> list[str]:
     """Return the keys of an answer at the level of the path's last key."""
-    value = _parse_answer(answer)
+    value = parse_answer(answer)
     for key in path.split(".")[:-1]:
         value = value.get(key) if isinstance(value, dict) else None
     return [str(key) for key in value] if isinstance(value, dict) else []
@@ -326,19 +326,20 @@ def _list_sibling_keys(answer: str, path: str) -> list[str]:
 
 def _unwrap_object(answer: str) -> dict[str, object]:
     """Return the innermost object of an answer that is wrapped in objects of one key; {} if it is not an object."""
-    value = _parse_answer(answer)
+    value = parse_answer(answer)
     while isinstance(value, dict) and len(value) == 1:
         value = next(iter(value.values()))
     return {str(key): each for key, each in value.items()} if isinstance(value, dict) else {}
 
 
-def _parse_answer(answer: str) -> object:
+def parse_answer(answer: str) -> object:
+    """Return the object in a JSON answer; None for any other text."""
     with contextlib.suppress(ValueError, UnreadableDataError):
         return read_json(answer.removeprefix(JSON)) if answer.startswith(JSON) else None
     return None
 
 
-def _describe_key_line(keys: list[str], clues: Clues) -> str:
+def describe_key_line(keys: list[str], clues: Clues) -> str:
     """Return the line of a responder that writes one of the keys; empty if none does."""
     for listing in clues.responder_process_listings:
         for key in keys:

@@ -17,6 +17,7 @@ from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, Statement, guess_result_name, join_tokens
 from service.grading.hint_differences import advise_on_difference
 from service.grading.hint_errors import describe_error
+from service.grading.judging.message_parts import quote_text
 from service.language import translatable
 from sim.recording import Fault, Verdict
 from sim.sentences import Sentence, make_clause
@@ -42,6 +43,7 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
         advice = advise_on_difference(wrong.expected, wrong.returned)
         if not advice and isinstance(wrong.returned, list) and isinstance(next(iter(wrong.returned), None), list):
             advice = advise_on_difference([], [[]])
+        advice = advice or _describe_other_return(wrong, clues)
         value_statement = _find_literal_statement(wrong.returned, clues) or _find_value_statement(wrong.function, clues)
         if value_statement is not None:
             listing, statement = value_statement
@@ -53,6 +55,28 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
                 advice=advice or Sentence("Work this call out by hand, line by line, and compare"),
             )
             return
+
+
+def _describe_other_return(wrong: WrongReturn, clues: Clues) -> str:
+    """Return the line with the text that was expected, if one text in quotes came in place of another."""
+    expected, actual = (_find_literal_statement(each, clues) for each in (wrong.expected, wrong.returned))
+    if expected is None or actual is None or expected[0] is not actual[0]:
+        return ""
+    listing, statement = expected
+    heads = [
+        next((each for each in listing.code.list_enclosing(one) if each.keyword in ("if", "elif")), None)
+        for one in (actual[1], statement)
+    ]
+    if heads[0] is None or heads[1] is None or heads[0] is heads[1]:
+        return ""
+    return Sentence(
+        "%(text)s is in line %(line)s. Compare the conditions in lines %(first)s and %(second)s with the rules: they "
+        "or the two texts may be swapped",
+        text=quote_text(str(wrong.expected)),
+        line=statement.line,
+        first=heads[0].line,
+        second=heads[1].line,
+    )
 
 
 def hint_about_hidden_prefix(clues: Clues) -> Iterator[str]:

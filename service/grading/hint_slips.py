@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from service.grading.fault_kinds import FaultKind, is_kind
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import CodeStatements, Statement, compute_bracket_depths, is_name, join_tokens
+from service.grading.hint_conditions import check_colour_name, check_contradiction, check_uncalled_predicate
 from service.grading.hint_loops import find_reading
 from service.grading.hint_operands import (
     check_decimal_comma,
@@ -363,6 +364,9 @@ _SLIP_CHECKS: Sequence[_SlipCheck] = (
     check_removal_in_loop,
     check_unreachable_if,
     _check_overwritten_list,
+    check_contradiction,
+    check_uncalled_predicate,
+    check_colour_name,
     _check_caret,
     _check_bitwise_operator,
     _check_constant_operand,

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_accepted import hint_about_missing_keys, hint_about_other_words
 from service.grading.hint_agents import hint_about_silent_agent, hint_about_text_of_agent, hint_about_unasked_agent
+from service.grading.hint_answer_forms import hint_about_missing_frame, hint_about_quoted_values
 from service.grading.hint_answers import (
     hint_about_answer_values,
     hint_about_image_command,
@@ -214,6 +215,8 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_about_printed_object,
     hint_about_missing_else,
     hint_about_swapped_sides,
+    hint_about_missing_frame,
+    hint_about_quoted_values,
     hint_about_returned_pair,
     hint_about_quoted_object,
     hint_about_large_step,

@@ -206,7 +206,11 @@ def _judge_calls(criterion: Functions, results: CallResults | None) -> Outcome:
                 name, first_problem = call.function or criterion.function, problem
                 expected = None if call.one_of else call.returns
                 is_failed = value is MISSING
-                findings = (FailedCall(name, call_result.fault) if is_failed else WrongReturn(name, expected, value),)
+                findings = (
+                    FailedCall(name, call_result.fault, call_result.value)
+                    if is_failed
+                    else WrongReturn(name, expected, value),
+                )
     if not first_problem and any(score < min_score for score in scores):
         first_problem, findings = _describe_hidden_failures(criterion, results, scores, min_score)
     return _combine_call_scores(criterion, scores, first_problem, for_staff, findings)
