@@ -15,6 +15,7 @@ from service.grading.grade import Evidence
 from service.grading.hint_clues import Clues, F, Listing, name_cell
 from service.grading.hint_code import CallInCode, Statement, join_tokens
 from service.grading.hint_counterfactuals import suggest_number
+from service.grading.hint_steering import describe_steering_mistake
 from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
 from service.grading.judging.message_parts import quote_text
@@ -368,6 +369,9 @@ def _hint_about_steering(failure: _Failure) -> str:
     steering_pair = next(((each, call) for each in failure.lines for call in each.calls if _is_steering(call)), None)
     if steering_pair is None:
         return ""
+    mistake = describe_steering_mistake(failure.listing, *steering_pair)
+    if mistake:
+        return mistake
     return Sentence(
         "%(place)s steers: %(problem)s. If the robot turns too little, multiply the difference by a larger number or "
         "drive slower; if it turns away from the line, change the sign of the steering",

@@ -12,6 +12,7 @@ from service.grading.hint_amounts import describe_large_amount, describe_passed_
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
 from service.grading.hint_discarded_values import describe_discarded_value, suggest_correct_statement
+from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
 from service.grading.judging.message_parts import add_place
 from service.language import translatable
@@ -74,6 +75,15 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
             condition=join_tokens(loops[0].condition),
             line=loops[0].line,
         )
+    late_move = _find_late_move(loops[0], code) if loops and clues.is_stationary else None
+    if late_move is not None:
+        return Sentence(
+            "%(place)s: the loop waits for another reading, but the robot stands still: line %(line)s switches the "
+            "motors on only below the loop. Move line %(line)s above line %(loop)s",
+            place=listing.locate(loops[0].line),
+            line=late_move.line,
+            loop=loops[0].line,
+        )
     if loops and loops[0].has_token("pyState") and not clues.answers:
         template = (
             translatable("%(place)s: the loop waits for a message in the queue, but no answer came")
@@ -111,6 +121,16 @@ def _waits_for_motion(loop: Statement, code: CodeStatements) -> bool:
     methods = {call.name.rpartition(".")[2] for each in code.statements for call in each.calls if "." in call.name}
     is_moving = bool(methods & (LIMITED_MOVES | CONTINUOUS_MOVES))
     return loop.keyword == "while" and loop.has_token(*PROPERTIES) and not is_moving
+
+
+def _find_late_move(loop: Statement, code: CodeStatements) -> Statement | None:
+    """Return the line that switches the motors on below a loop that reads a sensor, if no line above does."""
+    body = code.list_body(loop)
+    is_reading = any(each.has_token(*PROPERTIES) for each in (loop, *body))
+    moves = [each for each in code.statements if has_motor_call(each, LIMITED_MOVES | CONTINUOUS_MOVES)]
+    is_below = bool(moves) and moves[0].number > loop.number + len(body)
+    is_alone = loop.keyword == "while" and is_reading and is_below and moves[0].indent == loop.indent
+    return moves[0] if is_alone and has_motor_call(moves[0], CONTINUOUS_MOVES) else None
 
 
 def _suggest_loop_fix(loop: Statement, code: CodeStatements, fault: Fault) -> str:
