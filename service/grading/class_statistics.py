@@ -30,6 +30,7 @@ class MarkedCriterion:
     title: str
     marks: Decimal
     max_marks: Decimal
+    has_hidden_trials: bool = False  # students do not see all its trials, or not the criterion itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,15 @@ def scale_marks(marks: Decimal, max_marks: Decimal, worth: Decimal) -> Decimal |
 def to_marked_submission(grade: Grade) -> MarkedSubmission:
     """Convert a grade for statistics, without criteria that could not be judged."""
     criteria = tuple(
-        MarkedCriterion(each.id, each.title, each.marks, each.max_marks) for each in grade.criteria if not each.unjudged
+        MarkedCriterion(
+            each.id,
+            each.title,
+            each.marks,
+            each.max_marks,
+            has_hidden_trials=each.visibility != "visible" or each.shown is not None,
+        )
+        for each in grade.criteria
+        if not each.unjudged
     )
     marks = scale_marks(grade.marks, grade.max_marks, grade.worth)
     marks = Decimal(0) if marks is None else marks

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Protocol
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from service.grading.class_statistics import MarkedCriterion, MarkedSubmission, scale_marks
@@ -56,17 +56,19 @@ def load_marked_submissions(session: Session, lines: Sequence[MarkedLine]) -> li
                 CriterionResultRow.marks,
                 CriterionResultRow.max_marks,
                 CriterionResultRow.unjudged,
+                or_(CriterionResultRow.visibility != "visible", CriterionResultRow.shown.is_not(None)),
             )
             .where(CriterionResultRow.job_id.in_(job_ids))
             .order_by(CriterionResultRow.job_id, CriterionResultRow.position)
         )
-        for job_id, criterion, title, marks, worth, unjudged in rows:
+        for job_id, criterion, title, marks, worth, unjudged, has_hidden_trials in rows:
             override = overrides_by_job.get(job_id, {}).get(criterion)
             max_marks_by_job[job_id] += worth
             if override is not None:
-                criteria[job_id].append(MarkedCriterion(criterion, title, *override.compute_marks(worth)))
-            elif unjudged is None:
-                criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth))
+                marks, worth = override.compute_marks(worth)
+            elif unjudged is not None:
+                continue
+            criteria[job_id].append(MarkedCriterion(criterion, title, marks, worth, bool(has_hidden_trials)))
     marked_submissions = []
     for line in graded_lines:
         worth, line_criteria = max_marks_by_job[line.id], tuple(criteria[line.id])
