@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from service.grading.class_statistics import AssignmentStatistics
+    from service.grading.task_quality import Interval, TaskQuality
 
 _MAX_CAUSES = 5
 #: Maximum number of students that a row names.
@@ -44,6 +45,40 @@ def build_statistics(statistics: Iterable[AssignmentStatistics]) -> Iterator[Ren
                     to_one_line(cause.sentence), str(len(cause.students)), format_names(cause.students)
                 )
             yield causes_table
+
+
+def build_quality(quality: TaskQuality) -> Iterator[RenderableType]:
+    """Yield the table on an assignment's criteria, then a line for each finding."""
+    if quality.criteria:
+        columns = ("facility", "discrimination", "intended weight", "effective weight")
+        table = create_table("how good is the task?", *columns, right=columns)
+        for criterion in quality.criteria:
+            table.add_row(
+                to_one_line(criterion.title),
+                _format_share(criterion.facility, criterion.facility_interval),
+                _format_number(criterion.discrimination, criterion.discrimination_interval),
+                f"{criterion.intended_weight:.0%}",
+                _format_share(criterion.effective_weight, criterion.effective_weight_interval),
+            )
+        yield table
+    yield from (to_one_line(finding.sentence) for finding in quality.findings)
+    if quality.hidden_shares is not None:
+        shares = quality.hidden_shares
+        yield f"mean share of marks: {shares.visible:.0%} without hidden trials, {shares.hidden:.0%} with them"
+    if quality.note:
+        yield quality.note
+
+
+def _format_share(value: float | None, interval: Interval | None) -> str:
+    if value is None or interval is None:
+        return "-"
+    return f"{value:.0%} ({interval.low:.0%} to {interval.high:.0%})"
+
+
+def _format_number(value: float | None, interval: Interval | None) -> str:
+    if value is None or interval is None:
+        return "-"
+    return f"{value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
 
 
 def format_names(students: tuple[str, ...]) -> str:

@@ -91,6 +91,7 @@ def _build_environment(language: Language) -> Environment:
     environment.filters["moment"] = _format_moment
     environment.filters["share"] = _compute_percentage
     environment.filters["duration"] = _format_duration
+    environment.filters["sentence"] = language.translate_sentence
     environment.filters["typed"] = _format_typed_text
     environment.globals["zone_now"] = format_current_offset
     return environment

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from service.commands.batch.control import DEFAULT_PASS_MARK, BatchId, PassMark
 from service.commands.installation import open_installation
 from service.commands.output import create_table, print_json, print_line, print_renderables
-from service.commands.statistics_tables import build_statistics, format_names
+from service.commands.statistics_tables import build_quality, build_statistics, format_names
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -28,7 +28,7 @@ def show_overview(
     batch: BatchId,
     pass_mark: PassMark = DEFAULT_PASS_MARK,
 ) -> None:
-    """Show marks and their distribution, criteria, causes, students who need attention, and missing submissions."""
+    """Show marks, criteria, causes, how good the task is, submissions that need review, and missing submissions."""
     from service.operations import batch_views, batches
 
     with open_installation() as (service, actor):
@@ -42,6 +42,7 @@ def show_overview(
     for class_overview in classes:
         print_renderables(*build_statistics([class_overview.statistics]), _build_distribution(class_overview))
         print_line(f"{class_overview.passed} of {class_overview.statistics.n} have {pass_mark} % or more")
+        print_renderables(*build_quality(class_overview.quality))
         if class_overview.outliers:
             print_renderables(_build_outliers(class_overview, lines_by_id))
         for identical_lines in class_overview.identical:

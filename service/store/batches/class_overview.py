@@ -1,4 +1,4 @@
-"""Overview of a batch: marks, criteria, causes, outliers and missing submissions. Read-only.
+"""Overview of a batch: marks, criteria, the task itself, causes, outliers and missing submissions. Read-only.
 
 ``service.grading`` computes the statistics. ``similarities.py`` finds similar submissions, which takes longer.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from sqlalchemy import exists, select
 from sqlalchemy.orm import Session
@@ -23,12 +24,16 @@ from service.store.tables.people import Enrolment
 from service.store.tables.submissions import SubmissionRow
 from submissions.student_identity import Student
 
+if TYPE_CHECKING:
+    from service.grading.task_quality import TaskQuality
+
 
 @dataclass(frozen=True, slots=True)
 class ClassOverview:
     """Overview of one assignment; ``identical`` contains groups of submissions with the same content."""
 
     statistics: AssignmentStatistics
+    quality: TaskQuality
     distribution: tuple[MarksBin, ...]
     passed: int
     outliers: tuple[Outlier, ...]
@@ -40,6 +45,9 @@ def compute_overviews(
     session: Session, course_id: int, lines: Sequence[TableLine], pass_share: Decimal, hidden_names: HiddenNames
 ) -> tuple[ClassOverview, ...]:
     """Return the overview of each assignment in the rows of a batch."""
+    # Imported here, because it imports numpy, which other views of batches do not need.
+    from service.grading.task_quality import assess_task
+
     graded_lines = [line for line in lines if current_grades.is_for_students(line)]
     overviews = []
     marked_submissions = load_marked_submissions(session, graded_lines)
@@ -48,12 +56,13 @@ def compute_overviews(
         assignment_lines = [
             line for line in graded_lines if line.assignment == statistics.assignment and line.share >= 0
         ]
-        marks = (each.marks for each in marked_submissions if each.assignment == statistics.assignment)
+        own_submissions = [each for each in marked_submissions if each.assignment == statistics.assignment]
         marks_and_times = [MarksAndTime(line.id, line.share, line.seconds) for line in assignment_lines]
         overviews.append(
             ClassOverview(
                 statistics,
-                compute_distribution(marks, statistics.max_marks),
+                assess_task(own_submissions),
+                compute_distribution((each.marks for each in own_submissions), statistics.max_marks),
                 sum(line.share >= pass_share for line in assignment_lines),
                 find_outliers(marks_and_times, pass_share),
                 _group_identical([line for line in lines if line.assignment == statistics.assignment]),

@@ -85,10 +85,53 @@ class MissingShape(Shape):
     name: str
 
 
+class CriterionQualityShape(Shape):
+    """Figures of a criterion, with bootstrap intervals of 95 % from low to high."""
+
+    id: str
+    title: str
+    facility: float = Field(description="Mean fraction of the criterion's marks, from 0 to 1.")
+    facility_interval: tuple[float, float]
+    discrimination: float | None = Field(description="Correlation with the total of the other criteria.")
+    discrimination_interval: tuple[float, float] | None
+    intended_weight: float = Field(description="The criterion's fraction of all marks.")
+    effective_weight: float | None = Field(
+        description="Its fraction of the spread of the total, as in Moodle's quiz statistics."
+    )
+    effective_weight_interval: tuple[float, float] | None
+
+
+class QualityFindingShape(Shape):
+    """A reason to look at the assignment again, with the ids of the affected criteria."""
+
+    kind: Literal["all-full", "all-lost", "discrimination", "agreement", "weight", "overfit"]
+    criteria: list[str]
+    sentence: str
+
+
+class HiddenSharesShape(Shape):
+    """Mean fractions of the marks, and the submissions that have all visible and less than half of the hidden marks."""
+
+    visible: float
+    hidden: float = Field(description="In criteria with hidden trials.")
+    overfitted: int
+
+
+class QualityShape(Shape):
+    """How well the assignment measures. With fewer than 10 submissions, there is only a note."""
+
+    n: int
+    criteria: list[CriterionQualityShape]
+    findings: list[QualityFindingShape]
+    hidden_shares: HiddenSharesShape | None
+    note: str
+
+
 class ClassShape(Shape):
     """The results of a batch for one assignment."""
 
     statistics: StatisticsShape
+    quality: QualityShape
     distribution: list[BinShape]
     passed: int = Field(description="Number of students who reach the pass mark.")
     outliers: list[OutlierShape]
@@ -162,6 +205,7 @@ def show_overview(
         classes=[
             ClassShape(
                 statistics=StatisticsShape.model_validate(each.statistics),
+                quality=QualityShape.model_validate(each.quality),
                 distribution=[BinShape.model_validate(bin_) for bin_ in each.distribution],
                 passed=each.passed,
                 outliers=[OutlierShape.model_validate(outlier) for outlier in each.outliers],

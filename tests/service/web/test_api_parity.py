@@ -109,6 +109,7 @@ def test_a_batch_is_looked_at_before_and_after(programs: Programs) -> None:
     (seen,) = programs.ask("grace", "GET", f"{batch}/overview?pass=0").json()["classes"]
     assert (seen["passed"], sum(each["count"] for each in seen["distribution"])) == (1, 1)
     assert "bob" in [each["id"] for each in seen["missing"]]
+    assert (seen["quality"]["n"], seen["quality"]["findings"]) == (1, [])
     assert programs.ask("grace", "GET", f"{batch}/publish").json()["counts"]["published"] == 1
 
 

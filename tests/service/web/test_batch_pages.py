@@ -326,6 +326,24 @@ def test_the_overview_says_what_was_lost_by_whom_and_who_is_missing(web: Web, gr
     assert "Passed (0 per cent or more) 2 (100 %)" in words(everybody)
 
 
+def test_the_overview_shows_how_good_the_task_is_in_both_languages(web: Web, grace: TestClient) -> None:
+    """Twelve students have the same marks, so no criterion has a discrimination."""
+    small = a_batch(web, "ada", "bob")
+    page_text = words(grace.get(f"{HOME}/batches/{small.id}/overview").text)
+    assert "Figures on the task need at least 10 graded submissions; there are 2." in page_text
+    made = a_batch(web, *(f"s{number}" for number in range(12)))
+    path = f"{HOME}/batches/{made.id}/overview"
+    page_text = words(grace.get(path).text)
+    for each in (
+        "How good is the task? ",
+        "none of 12 submissions has any marks. Check the task and the criterion.",
+        "Criterion Facility Discrimination Intended weight Effective weight",
+        "0 % (0 – 0) – ",
+    ):
+        assert each in page_text, page_text
+    assert "Keine von 12 Abgaben hat Punkte." in words(grace.get(path, headers={"accept-language": "de"}).text)
+
+
 def test_what_is_nearly_the_same_is_shown_with_its_lines_across_the_batches_of_a_course(
     web: Web, grace: TestClient
 ) -> None:
