@@ -111,6 +111,7 @@ def _find_best_change(
     path_criteria = [each for each in visible_criteria if isinstance(each, _PATH_CRITERIA)]
     remaining_ticks = _MAX_TICKS
     ticks = sum(len(each.recording.ticks) for each in trials)
+    current_marks = [_compute_marks(each, clues, trials) for each in path_criteria]
     best: tuple[float, float, _Change, float] | None = None
     for change in list(_collect_changes(listing, trials))[:_MAX_LINES]:
         passing_factors = []
@@ -123,7 +124,11 @@ def _find_best_change(
         if not passing_factors:
             continue
         factor = _choose_factor(passing_factors)
-        total = sum(_compute_marks(each, clues, _apply_change(trials, change, factor)) for each in path_criteria)
+        changed_trials = _apply_change(trials, change, factor)
+        marks = [_compute_marks(each, clues, changed_trials) for each in path_criteria]
+        if any(new < old for new, old in zip(marks, current_marks, strict=True)):
+            continue  # it would lose marks that the program has
+        total = sum(marks)
         size = abs(math.log(abs(factor))) + (factor < 0)
         if best is None or (-total, size) < best[:2]:
             best = -total, size, change, factor
