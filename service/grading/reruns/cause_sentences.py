@@ -16,6 +16,7 @@ from service.grading.reruns.engine import Rerun
 from service.grading.reruns.exchanges import (
     SECOND_PROGRAM_PART,
     AnswersFrom,
+    ChangedLine,
     Exchange,
     GivenPart,
     MoreTime,
@@ -33,6 +34,7 @@ from submissions.submission import PART_FILES, SECOND_PROGRAM
 _FILES: Mapping[str, str] = MappingProxyType(
     {"program": PART_FILES["program"], "responder": PART_FILES["responder"], SECOND_PROGRAM_PART: SECOND_PROGRAM}
 )
+_MAX_CHANGE = 60
 _EFFECTS: Mapping[str, str] = MappingProxyType(
     {
         "duplication": translatable("no message duplicated"),
@@ -55,7 +57,13 @@ def build_shown_causes(causes: Sequence[Cause], reveals: int = 0, revealed_befor
         text = join_sentences(*(describe_cause(each) for each in group))
         if not text:
             continue
-        shown_cause = ShownCause(criterion, text, describe_next_step(group[0]), files=_list_losing_files(group[0]))
+        shown_cause = ShownCause(
+            criterion,
+            text,
+            describe_next_step(group[-1] if group[-1].kind == "line" else group[0]),
+            files=_list_losing_files(group[0]),
+            staff_note=_describe_change(group),
+        )
         if any(each.is_hidden for each in group):
             is_revealed = revealed_count < reveals
             revealed_count += is_revealed
@@ -64,7 +72,9 @@ def build_shown_causes(causes: Sequence[Cause], reveals: int = 0, revealed_befor
                 text=join_sentences(Sentence("In a hidden trial:"), text),
                 for_staff=not is_revealed,
                 is_hidden=True,
-                staff_note=_describe_visibility(is_revealed, revealed_count, reveals),
+                staff_note=join_sentences(
+                    _describe_visibility(is_revealed, revealed_count, reveals), shown_cause.staff_note
+                ),
             )
         shown_causes.append(shown_cause)
     return tuple(shown_causes)
@@ -95,6 +105,9 @@ def describe_next_step(cause: Cause) -> str:
     match cause.kind:
         case "parts":
             return _describe_part_step(cause)
+        case "line":
+            (change,) = (each for each in cause.reruns[0].exchanges if isinstance(each, ChangedLine))
+            return Sentence("Check line %(line)s of %(file)s, then submit again.", line=change.line, file=change.file)
         case "time":
             return Sentence("Make your program faster, or its waits shorter, then submit again.")
         case "start":
@@ -346,12 +359,41 @@ def _get_parts(rerun: Rerun) -> tuple[str, ...]:
     return tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart))
 
 
+def _describe_line(reruns: Sequence[Rerun], criterion: str) -> str:
+    (rerun,) = reruns
+    (change,) = (each for each in rerun.exchanges if isinstance(each, ChangedLine))
+    if not rerun.passes(criterion):
+        return ""
+    sentence = Sentence(
+        "With one change in line %(line)s of %(file)s, the same submission %(result)s.",
+        line=change.line,
+        file=change.file,
+        result=describe_result(rerun, criterion),
+    )
+    return join_sentences(sentence, change.direction)
+
+
+def _describe_change(causes: Sequence[Cause]) -> str:
+    """Return the change of a line, for staff; empty if there is none."""
+    exchanges = (each for cause in causes for rerun in cause.reruns for each in rerun.exchanges)
+    change = next((each for each in exchanges if isinstance(each, ChangedLine)), None)
+    if change is None:
+        return ""
+    return Sentence(
+        "For staff: in line %(line)s, %(old)s became %(new)s.",
+        line=change.line,
+        old=" ".join(change.old.split())[:_MAX_CHANGE] or '""',
+        new=" ".join(change.new.split())[:_MAX_CHANGE] or '""',
+    )
+
+
 _DESCRIPTIONS: Mapping[CauseKind, Callable[[Sequence[Rerun], str], str]] = MappingProxyType(
     {
         "parts": _describe_parts,
         "conditions": _describe_conditions,
         "chance": _describe_chance,
         "time": _describe_time,
+        "line": _describe_line,
         "start": _describe_start,
     }
 )

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
+from service.grading.reruns.changed_lines import find_changed_line
 from service.grading.reruns.engine import DEFAULT_BUDGET, Budget, BudgetSpent, Rerun, RerunEngine
 from service.grading.reruns.exchanges import (
     Exchange,
@@ -23,6 +24,7 @@ from service.grading.reruns.exchanges import (
     list_texts_and_answers,
 )
 from service.grading.reruns.halves import (
+    decide_losing_parts,
     find_losing_answer,
     find_losing_parts,
     list_student_parts,
@@ -32,9 +34,9 @@ from sim.random_streams import RandomStream
 from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Trial
 
-#: The ingredient that was exchanged: parts of the submission, noise or messages, chance, time, the start pose, or the
-#: text of a part.
-CauseKind = Literal["parts", "conditions", "chance", "time", "start", "source"]
+#: The ingredient that was exchanged: parts of the submission, noise or messages, chance, time, a line of a part, or the
+#: start pose.
+CauseKind = Literal["parts", "conditions", "chance", "time", "line", "start"]
 Item = TypeVar("Item")
 _OTHER_NOISES = 5
 #: Keys of criteria whose expectation can depend on the start pose.
@@ -79,7 +81,7 @@ def find_causes(
     main_finders = (_build_part_finder(reference), _find_conditions, _find_time)
     causes: list[Cause] = []
     for criterion in engine.assignment.criteria:
-        if criterion.id not in engine.lost_criteria or not criterion.judges_runs or criterion.result_needed:
+        if criterion.id not in engine.lost_criteria or not engine.can_judge(criterion.id):
             continue
         if criterion.id in explained or not engine.list_trials(criterion.id):
             continue
@@ -88,6 +90,8 @@ def find_causes(
         try:
             for finder in (*main_finders, *finders):
                 found_causes += itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes))
+            if all(each.kind == "parts" for each in found_causes):
+                found_causes += _find_line(engine, criterion.id, found_causes)
             if not found_causes:
                 found_causes += _find_start(engine, criterion.id)
         except BudgetSpent:
@@ -148,6 +152,16 @@ def _find_time(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
         rerun = _rerun_if_passing(engine, criterion, (MoreTime(),))
         if rerun is not None:
             yield _build_cause(engine, criterion, "time", rerun)
+
+
+def _find_line(engine: RerunEngine, criterion: str, part_causes: Sequence[Cause]) -> Iterator[Cause]:
+    """Yield the line with which one change loses nothing, in the parts that lose the marks."""
+    parts = [part for cause in part_causes for part in decide_losing_parts(cause.reruns, criterion)]
+    if len(parts) > 1:
+        return  # one change would not show what is wrong with several parts
+    rerun = find_changed_line(engine, criterion, parts or list_student_parts(engine.assignment))
+    if rerun is not None:
+        yield _build_cause(engine, criterion, "line", rerun)
 
 
 def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:

@@ -15,18 +15,28 @@ from service.grading.grade import CriterionResult, Grade, TrialResult
 from service.grading.judging.judge_declaration import StaticAnalysis
 from service.grading.judging.limited_judging import compute_judging_limits, judge_within_limits
 from service.grading.notebook_trial import NotebookTrial
-from service.grading.reruns.exchanges import Exchange, GivenPart, apply_exchanges
+from service.grading.reruns.exchanges import (
+    SECOND_PROGRAM_PART,
+    ChangedLine,
+    Exchange,
+    GivenPart,
+    PartName,
+    apply_exchanges,
+)
 from service.grading.run_plan import RunPlan
 from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
 from service.grading.trial_specs import build_trial_spec
-from sim.errors import UsageError
+from sim.errors import RobomarkError, UsageError
 from sim.recording import Recording
 from submissions.assignment.definition import Assignment, Trial
+from submissions.criteria import Criterion
 from submissions.criteria.code import PythonCheck
 from submissions.seeds import PUBLIC_SECRET, SeedSource
 
 _VISIBLE = "visible"
+#: CPU seconds of a run with a changed line.
+_MAX_CHANGED_SECONDS = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +58,11 @@ class Spent:
     cpu_seconds: float
 
 
-class BudgetSpent(Exception):
+class RunTooLong(RobomarkError):
+    """Raised instead of a rerun with a changed line that computes for much longer than the program did."""
+
+
+class BudgetSpent(RobomarkError):
     """Raised instead of a rerun that the budget does not pay for."""
 
 
@@ -145,15 +159,41 @@ class RerunEngine:
         """Return whether parts can be exchanged: all were submitted, not as a notebook that is executed."""
         return not isinstance(self._plan.trial, NotebookTrial) and self._plan.missing is None
 
+    def get_source(self, part: PartName) -> str | None:
+        """Return the text of a part as it runs; None if the submission does not have it as a file of its own."""
+        plan = self._plan
+        if isinstance(plan.trial, NotebookTrial):
+            return None
+        specs = {"program": plan.program, "responder": plan.responder, SECOND_PROGRAM_PART: plan.second_program}
+        spec = specs.get(part) or plan.agents.get(part)
+        return None if spec is None else spec.code.text
+
     @property
     def spent(self) -> Spent:
         """The costs since the budget was full."""
         return Spent(self._runs, self._cpu_seconds)
 
     def list_trials(self, criterion: str) -> tuple[int, ...]:
-        """Return the indices of the trials that a criterion judges and that may be run again."""
-        scenarios = next(each.scenarios for each in self.assignment.criteria if each.id == criterion)
-        return tuple(index for index, each in self.results.items() if not scenarios or each.scenario in scenarios)
+        """Return the indices of the trials that decide the marks of a criterion and that may be run again."""
+        return tuple(index for index, each in self.results.items() if self._judges(criterion, each.scenario))
+
+    def can_judge(self, criterion: str) -> bool:
+        """Return whether trials alone decide the marks of a criterion, with those that it needs."""
+        return all(each.judges_runs for each in self._list_needed(criterion))
+
+    def _judges(self, criterion: str, scenario: str) -> bool:
+        """Return whether a criterion, or one that it needs, judges the trials of a scenario."""
+        return any(not each.scenarios or scenario in each.scenarios for each in self._list_needed(criterion))
+
+    def _list_needed(self, criterion: str) -> list[Criterion]:
+        """Return a criterion and those that it needs the results of."""
+        by_id = {each.id: each for each in self.assignment.criteria}
+        needed: list[Criterion] = []
+        name: str | None = criterion
+        while name is not None and name in by_id and by_id[name] not in needed:
+            needed.append(by_id[name])
+            name = by_id[name].result_needed
+        return needed
 
     def list_failed_trials(self, criterion: str) -> tuple[int, ...]:
         """Return the indices of the trials that a criterion lost marks in and that may be run again."""
@@ -182,6 +222,7 @@ class RerunEngine:
 
         Raises:
             BudgetSpent: The budget does not pay for it.
+            RunTooLong: A program with a changed line computes for too long.
             HostError: The machine failed.
             Exception: Whatever the heartbeat raises.
         """
@@ -210,17 +251,30 @@ class RerunEngine:
         if self._runs >= self._budget.runs or seconds_left <= self._dearest_seconds:
             raise BudgetSpent
         self._runs += 1
+        # A changed line can make a loop endless, which must not use up the budget.
+        has_changed_line = any(isinstance(each, ChangedLine) for each in exchanges)
+        limit = min(seconds_left, _MAX_CHANGED_SECONDS) if has_changed_line else seconds_left
+        cut = RunTooLong("the changed program computes for too long") if limit < seconds_left else BudgetSpent()
         start = time.process_time()
-        meter = JobMeter(JobLimits(cpu_seconds=seconds_left), self._heartbeat)
+
+        def check_budget() -> None:
+            self._heartbeat()
+            if meter.spent.cpu_seconds + time.process_time() - start > limit:
+                raise cut
+
+        meter = JobMeter(JobLimits(cpu_seconds=limit), check_budget)
         spec = build_trial_spec(self.trials[index], self._trial_plan)
         spec = apply_exchanges(replace(spec, records_lines=False), exchanges)
-        recording = self._plan.trial.run(spec, self.assignment.world.obstacles, self._runner, meter)
-        seconds = meter.spent.cpu_seconds + time.process_time() - start
-        self._cpu_seconds += seconds
-        self._dearest_seconds = max(self._dearest_seconds, seconds)
-        if meter.spent.cpu_seconds >= seconds_left:
-            # The limit of the budget may have ended the trial, so its recording proves nothing.
-            raise BudgetSpent
+        try:
+            recording = self._plan.trial.run(spec, self.assignment.world.obstacles, self._runner, meter)
+        finally:
+            seconds = meter.spent.cpu_seconds + time.process_time() - start
+            self._cpu_seconds += seconds
+            if not has_changed_line:
+                self._dearest_seconds = max(self._dearest_seconds, seconds)
+        if meter.spent.cpu_seconds >= limit:
+            # The limit may have ended the trial, so its recording proves nothing.
+            raise cut
         self._recordings[index, keys] = recording
         return recording
 
@@ -241,8 +295,7 @@ class RerunEngine:
     def _build_outcome(
         self, result: CriterionResult, indices: Sequence[int], recordings: Mapping[int, Recording]
     ) -> RerunOutcome:
-        scenarios = next(each.scenarios for each in self.assignment.criteria if each.id == result.id)
-        is_withheld = any(not scenarios or each in scenarios for each in self._withheld_scenarios)
+        is_withheld = any(self._judges(result.id, each) for each in self._withheld_scenarios)
         return RerunOutcome(
             result.marks,
             result.max_marks,

@@ -228,6 +228,31 @@ class OtherSource:
         return spec
 
 
+@dataclass(frozen=True, slots=True)
+class ChangedLine:
+    """One change in a line of a part: ``old`` became ``new``, and ``text`` is the result.
+
+    ``direction`` is the sentence on a number that is too large or too small, if the change is of a number.
+    """
+
+    part: PartName
+    file: str
+    line: int
+    old: str
+    new: str
+    text: str = field(repr=False)
+    direction: str = ""
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return OtherSource(self.part, self.text).key
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        return OtherSource(self.part, self.text).apply(spec)
+
+
 def apply_exchanges(spec: TrialSpec, exchanges: Sequence[Exchange]) -> TrialSpec:
     """Return the trial with all these ingredients replaced."""
     for exchange in exchanges:

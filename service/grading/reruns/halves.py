@@ -69,8 +69,9 @@ def decide_losing_parts(reruns: Sequence[Rerun], criterion: str) -> tuple[PartNa
     """Return the parts that lose the marks of a criterion, according to reruns with parts of the reference.
 
     These are the parts each of which the reference's replaces without loss. If there are none, these are the parts that
-    still lose marks beside the reference's other parts.
+    still lose marks beside the reference's other parts. Reruns with other exchanges are left out.
     """
+    reruns = [rerun for rerun in reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
     given_parts = [tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart)) for rerun in reruns]
     parts = tuple(dict.fromkeys(part for given in given_parts for part in given))
     losing = tuple(

@@ -17,6 +17,7 @@ from service.grading.reruns.causes import Cause, CauseKind
 from service.grading.reruns.engine import Rerun, RerunOutcome
 from service.grading.reruns.exchanges import (
     AnswersFrom,
+    ChangedLine,
     Exchange,
     GivenPart,
     MoreTime,
@@ -84,6 +85,7 @@ CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
         reruns(st.builds(lambda numbers: (WithoutMessageLoss(numbers),), st.frozensets(st.integers(1, 9), min_size=1))),
     ),
     "chance": st.builds(tuple, st.lists(reruns(st.just((OtherNoise(1),))), min_size=1, max_size=5)),
+    "line": st.tuples(reruns(st.just((ChangedLine("program", "robot.py", 8, "<", ">", "", "It is too short."),)))),
     "time": st.tuples(reruns(st.just((MoreTime(),)))),
     "start": st.tuples(reruns(st.just((VisibleStart(Pose(1, 2, 3), 0),)))),
 }
@@ -199,6 +201,9 @@ def check_claims(text: str, cause: Cause) -> None:
         case "chance":
             numbers = re.findall(r"\d+", text)
             assert numbers == [str(len(cause.reruns)), str(sum(map(passes, cause.reruns)))]
+        case "line":
+            check_result(text.removesuffix(" It is too short."), cause.reruns[0])
+            assert text.startswith("With one change in line 8 of robot.py, the same submission ")
         case "time":
             check_result(text, cause.reruns[0])
             assert "With 2 times the simulated time" in text

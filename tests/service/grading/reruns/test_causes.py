@@ -16,6 +16,7 @@ from service.grading.reruns.grade_causes import add_causes
 from service.grading.reruns.halves import list_student_parts, plan_reference
 from service.grading.run_plan import plan_run
 from service.grading.trial_runner import TrialRunner
+from service.mutation.source_tree import SourceTree
 from submissions.assignment.definition import Assignment, Reruns
 from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment
@@ -105,13 +106,14 @@ def test_lost_messages_are_the_cause_for_a_program_that_sends_once(runner: Trial
             "replies",
             "With the reference's responder in place of yours, the same program gets all 4 marks: the responder loses "
             "the marks. The first answer that differs is number 3. With the reference's answers from number 3 on, the "
-            "trial passes; from number 4 on, it still fails.",
+            "trial passes; from number 4 on, it still fails. With one change in line 14 of responder.py, the same "
+            "submission gets all 4 marks.",
         ),
         (
             {"program": ("number % 2 == 0", "number % 2 == 1")},
             "messages",
             "With the reference's program in place of yours, the same responder gets all 2 marks: the program loses "
-            "the marks.",
+            "the marks. With one change in line 5 of robot.py, the same submission gets all 2 marks.",
         ),
     ],
     ids=["every answer", "last answer", "program"],
@@ -140,13 +142,29 @@ def test_same_causes_twice_and_without_a_reference_no_parts(runner: TrialRunner)
 
     def find(given: Submission | None) -> tuple[Cause, ...]:
         engine = RerunEngine(runner, plan_run(submission, assignment), graded)
-        return find_causes(engine, None if given is None else plan_reference(given, assignment))
+        plan = None if given is None else plan_reference(given, assignment)
+        return find_causes(engine, plan, budget=Budget(runs=6))
 
     (first,), (second,) = find(reference), find(reference)
     assert [rerun.exchanges for rerun in first.reruns] == [rerun.exchanges for rerun in second.reruns]
     assert first.reruns[0].recordings[0].sha256 == second.reruns[0].recordings[0].sha256
     assert {type(exchange) for rerun in first.reruns for exchange in rerun.exchanges} == {GivenPart, AnswersFrom}
     assert find(None) == ()
+
+
+def test_line_of_a_wrong_number_is_named_and_staff_see_the_change(runner: TrialRunner) -> None:
+    assignment = find_assignment("turn-through-a-right-angle")
+    reference = read_example("turn-through-a-right-angle", "reference")
+    assert reference.program is not None
+    number = next(each for each in SourceTree(reference.program.text).numbers if each.value == 1.6)
+    text = f"{reference.program.text[: number.start]}2.4{reference.program.text[number.end :]}"
+    submission = replace(reference, program=SourceFile("robot.py", text))
+    graded = add_causes(grade(submission, assignment, runner=runner), submission, assignment, runner)
+    (cause, *_) = graded.causes
+    assert cause.text.startswith(f"With one change in line {number.line} of robot.py, the same submission gets")
+    assert cause.text.endswith(f"The turn at line {number.line} of robot.py is too long.")
+    assert cause.next_step == f"Check line {number.line} of robot.py, then submit again."
+    assert cause.staff_note == f"For staff: in line {number.line}, 2.4 became 1.6."
 
 
 def test_parts_of_the_student() -> None:
