@@ -27,6 +27,14 @@ from service.grading.reruns.exchanges import (
     WithoutMotorNoise,
 )
 from service.grading.reruns.halves import decide_losing_parts, find_first_difference
+from service.grading.reruns.mildest_sentences import (
+    CONDITIONS_STEP,
+    NOISE_STEP,
+    RESEND_STEP,
+    START_STEP,
+    describe_mildest,
+    describe_mildest_step,
+)
 from service.language import translatable
 from sim.sentences import Sentence, join_sentences, join_with_and
 from submissions.submission import PART_FILES, SECOND_PROGRAM
@@ -111,13 +119,15 @@ def describe_next_step(cause: Cause) -> str:
         case "time":
             return Sentence("Make your program faster, or its waits shorter, then submit again.")
         case "start":
-            return Sentence("Make your program independent of the start pose, then submit again.")
+            return Sentence(START_STEP)
+        case "mildest":
+            return describe_mildest_step(cause.reruns)
     exchanges = [exchange for rerun in cause.reruns for exchange in rerun.exchanges]
     if any(isinstance(each, WithoutMessageLoss) for each in exchanges):
-        return Sentence("Send a message again if its answer does not arrive, then submit again.")
+        return Sentence(RESEND_STEP)
     if any(isinstance(each, WithoutLightNoise | WithoutMotorNoise) for each in exchanges):
-        return Sentence("Make your program work with noise: decide by more than one reading, then submit again.")
-    return Sentence("Make your program work under these conditions, then submit again.")
+        return Sentence(NOISE_STEP)
+    return Sentence(CONDITIONS_STEP)
 
 
 def _describe_part_step(cause: Cause) -> str:
@@ -395,5 +405,6 @@ _DESCRIPTIONS: Mapping[CauseKind, Callable[[Sequence[Rerun], str], str]] = Mappi
         "time": _describe_time,
         "line": _describe_line,
         "start": _describe_start,
+        "mildest": describe_mildest,
     }
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 from service.grading.reruns.changed_lines import find_changed_line
@@ -29,14 +29,15 @@ from service.grading.reruns.halves import (
     find_losing_parts,
     list_student_parts,
 )
+from service.grading.reruns.mildest import Conditions, find_mildest_failure, get_conditions, remove_conditions
 from service.grading.run_plan import RunPlan
 from sim.random_streams import RandomStream
 from sim.recording import Recording, Verdict
 from submissions.assignment.definition import Trial
 
 #: The ingredient that was exchanged: parts of the submission, noise or messages, chance, time, a line of a part, or the
-#: start pose.
-CauseKind = Literal["parts", "conditions", "chance", "time", "line", "start"]
+#: start pose; ``mildest`` are the mildest conditions with which a trial still fails.
+CauseKind = Literal["parts", "conditions", "chance", "time", "line", "start", "mildest"]
 Item = TypeVar("Item")
 _OTHER_NOISES = 5
 #: Keys of criteria whose expectation can depend on the start pose.
@@ -94,6 +95,8 @@ def find_causes(
                 found_causes += _find_line(engine, criterion.id, found_causes)
             if not found_causes:
                 found_causes += _find_start(engine, criterion.id)
+            if len(found_causes) < _MAX_CAUSES:
+                found_causes += _find_mildest(engine, criterion.id)
         except BudgetSpent:
             pass
         causes += found_causes
@@ -169,8 +172,7 @@ def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
 
     Criteria that expect something else from each pose would be judged by what the original pose shows.
     """
-    schema = next(each for each in engine.assignment.criteria if each.id == criterion)
-    if _EXPECTATIONS & type(schema).model_fields.keys():
+    if _depends_on_pose(engine, criterion):
         return
     failed_trials = engine.list_failed_trials(criterion)
     for trial in failed_trials[:1]:
@@ -183,6 +185,39 @@ def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
             if rerun.passes(criterion):
                 yield _build_cause(engine, criterion, "start", rerun)
             return
+
+
+def _find_mildest(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
+    """Yield the mildest conditions with which a trial still fails: of noise, message loss and start pose."""
+    schema = next(each for each in engine.assignment.criteria if each.id == criterion)
+    failed_trials = engine.list_failed_trials(criterion) if schema.judges_each_trial else ()
+    for trial in failed_trials[:1]:
+        easy = _choose_easy_conditions(engine, criterion, trial)
+        reruns = None if easy is None else find_mildest_failure(engine, criterion, trial, easy)
+        if reruns is not None:
+            yield _build_cause(engine, criterion, "mildest", *reruns)
+
+
+def _choose_easy_conditions(engine: RerunEngine, criterion: str, trial: int) -> Conditions | None:
+    """Return the trial's conditions without those that cause the loss, or those of a visible trial that passed."""
+    hard = get_conditions(engine.trials[trial])
+    conditions = _list_conditions(engine.trials[trial], engine.results[trial].recording)
+    # These reruns are known already.
+    smallest = find_smallest(conditions, lambda exchanges: _rerun_if_passing(engine, criterion, exchanges))
+    if smallest is not None:
+        return remove_conditions(hard, smallest.exchanges)
+    failed_trials = engine.list_failed_trials(criterion)
+    for other in engine.list_trials(criterion):
+        if other not in failed_trials and engine.results[other].visibility == "visible":
+            easy = get_conditions(engine.trials[other])
+            return replace(easy, pose=hard.pose) if _depends_on_pose(engine, criterion) else easy
+    return None
+
+
+def _depends_on_pose(engine: RerunEngine, criterion: str) -> bool:
+    """Return whether the criterion can expect something else from each start pose."""
+    schema = next(each for each in engine.assignment.criteria if each.id == criterion)
+    return bool(_EXPECTATIONS & type(schema).model_fields.keys())
 
 
 def _choose_failed_trial(engine: RerunEngine, criterion: str) -> int:

@@ -28,6 +28,7 @@ from service.grading.reruns.exchanges import (
     WithoutMessageLoss,
     WithoutMotorNoise,
 )
+from service.grading.reruns.mildest import Conditions, ScaledConditions
 from sim.recording import Pose
 
 pytestmark = pytest.mark.fast
@@ -78,6 +79,28 @@ THREE_PARTS = st.tuples(
     *(parts(name) for name in ("parser", "agent", "logger")),
     *(parts(*names) for names in (("agent", "logger"), ("parser", "logger"), ("parser", "agent"))),
 )
+EASY_AND_HARD = st.tuples(
+    *(
+        st.builds(
+            Conditions,
+            st.sampled_from([0.0, 8.0]),
+            st.sampled_from([0.0, 20.0]),
+            st.sampled_from([0.0, 0.4]),
+            st.builds(Pose, st.sampled_from([100.0, 500.0]), st.just(800.0), st.sampled_from([0.0, 350.0])),
+        )
+        for _ in range(2)
+    )
+)
+
+
+@st.composite
+def mildest(draw: st.DrawFn) -> tuple[Rerun, Rerun]:
+    """Return two reruns, a sixteenth of the way apart, with any outcomes."""
+    (easy, hard), step = draw(EASY_AND_HARD), draw(st.integers(0, 15))
+    passing, failing = (ScaledConditions(each / 16, easy, hard) for each in (step, step + 1))
+    return draw(reruns(st.just((passing,)))), draw(reruns(st.just((failing,))))
+
+
 CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
     "parts": st.one_of(TWO_PARTS, THREE_PARTS, st.builds(lambda a, b: (*a, *b), TWO_PARTS, ANSWER_PAIR)),
     "conditions": st.tuples(
@@ -88,6 +111,7 @@ CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
     "line": st.tuples(reruns(st.just((ChangedLine("program", "robot.py", 8, "<", ">", "", "It is too short."),)))),
     "time": st.tuples(reruns(st.just((MoreTime(),)))),
     "start": st.tuples(reruns(st.just((VisibleStart(Pose(1, 2, 3), 0),)))),
+    "mildest": mildest(),
 }
 
 
@@ -190,6 +214,26 @@ def check_conditions(text: str, cause: Cause) -> None:
         assert {int(each) for each in re.findall(r"\d", named[1])} == exchange.numbers
 
 
+def check_mildest(text: str, cause: Cause) -> None:
+    """Check that the sentence has the values of both reruns, and only those that differ."""
+    assert [passes(rerun) for rerun in cause.reruns] == [True, False]
+    halves = re.fullmatch(r"With (.+), one failed trial passes; with (.+), it fails\.", text)
+    assert halves is not None
+    conditions = [cast(ScaledConditions, rerun.exchanges[0]).conditions for rerun in cause.reruns]
+    for half, own, other in zip(halves.groups(), conditions, reversed(conditions), strict=True):
+        values = {
+            r"light noise of ([\d.]+)": (own.light_noise, other.light_noise),
+            r"motor noise of ([\d.]+)": (own.motor_noise, other.motor_noise),
+            r"message loss of ([\d.]+) %": (100 * own.loss, 100 * other.loss),
+            r"start at x ([\d.]+)": (own.pose.x, other.pose.x),
+            r"heading (-?[\d.]+)": (own.pose.heading, other.pose.heading),
+        }
+        for pattern, (own_value, other_value) in values.items():
+            named = re.search(pattern, half)
+            assert own_value == other_value or named is not None
+            assert named is None or float(named[1]) == pytest.approx(own_value, abs=0.01)
+
+
 def check_claims(text: str, cause: Cause) -> None:
     """Check every claim of the sentence against the reruns."""
     match cause.kind:
@@ -210,6 +254,8 @@ def check_claims(text: str, cause: Cause) -> None:
         case "start":
             assert passes(cause.reruns[0])
             assert "x 1, y 2, heading 3 degrees" in text
+        case "mildest":
+            check_mildest(text, cause)
 
 
 @pytest.mark.parametrize("kind", CAUSES)
@@ -220,6 +266,10 @@ def test_sentence_claims_only_what_the_reruns_showed(kind: CauseKind, data: st.D
     text = describe_cause(cause)
     if text:
         check_claims(text, cause)
+    elif kind == "mildest":
+        passing, failing = cause.reruns
+        is_same = cast(ScaledConditions, passing.exchanges[0]).easy == cast(ScaledConditions, passing.exchanges[0]).hard
+        assert is_same or not passes(passing) or not failing.loses("c")
     elif kind != "parts":
         assert not any(passes(rerun) for rerun in cause.reruns[:1]) or kind == "chance"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -85,6 +86,7 @@ def test_budget_ends_the_reruns_and_marks_do_not_change(runner: TrialRunner) -> 
 def test_lost_messages_are_the_cause_for_a_program_that_sends_once(runner: TrialRunner) -> None:
     graded = explain(runner, "lossy-echo", read_example("lossy-echo", "sends-once"))
     causes = {cause.criterion: cause for cause in graded.causes}
+    assert re.search(r"With a message loss of [\d.]+ %, one failed trial passes; with", causes["resends"].text)
     assert set(causes) == {result.id for result in graded.criteria if result.marks < result.max_marks}
     assert "the program loses the marks" in causes["resends"].text
     assert "With no message lost, the same submission gets all 4 marks. In one trial it is" in causes["resends"].text

@@ -24,6 +24,7 @@ from service.grading.reruns.exchanges import (
     collect_earlier_answers,
 )
 from service.grading.reruns.halves import find_first_difference
+from service.grading.reruns.mildest import Conditions, ScaledConditions
 from sim.floors import build_floor
 from sim.recording import Message, Pose
 from sim.robot import get_robot
@@ -73,6 +74,13 @@ def test_one_field_changes(exchange: Exchange, field: str) -> None:
 def test_one_noise_is_off_and_the_other_stays() -> None:
     assert WithoutLightNoise().apply(SPEC).noise == Noise(0, 20)
     assert WithoutMotorNoise().apply(SPEC).noise == Noise(8, 0)
+
+
+def test_scaled_conditions_are_between_both_ends() -> None:
+    easy, hard = Conditions(0, 0, 0, Pose(500, 800, 90)), Conditions(8, 20, 0.4, SPEC.pose)
+    middle = ScaledConditions(0.5, easy, hard).apply(SPEC)
+    assert (middle.noise, middle.channel.loss, middle.pose) == (Noise(4, 10), 0.2, Pose(300, 800, 45))
+    assert ScaledConditions(1, easy, hard).apply(SPEC) == SPEC
 
 
 def test_named_messages_are_not_lost_and_all_other_draws_stay() -> None:
