@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,6 +52,7 @@ def print_nearest(grade: Grade, searches: Sequence[NumberSearch]) -> None:
     titles = {each.id: to_one_line(each.title) for each in grade.criteria}
     for search in searches:
         change = search.change
+        print()
         print(f"Nearest change for {titles[search.criterion]!r} ({search.runs} runs):")
         if change is None:
             reason = "within the limit of runs and CPU time" if search.is_exhausted else "in this program"
@@ -63,7 +63,6 @@ def print_nearest(grade: Grade, searches: Sequence[NumberSearch]) -> None:
                 f"  line {change.line} of {change.file}: {change.old} -> {change.new} ({change.distance:.1%}), {marks}"
             )
             print(f"  For the student: {search.direction}")
-    sys.stdout.write("\n" if searches else "")
 
 
 def print_json_with_nearest(grade: Grade, submission: Submission, searches: Sequence[NumberSearch]) -> None:

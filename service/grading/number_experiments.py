@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Grade
 from service.grading.grader import grade
-from service.grading.number_roles import WHOLE_ROLES, Direction, NumberRole, find_direction, find_role
+from service.grading.number_roles import WHOLE_ROLES, Direction, NumberRole, find_direction, find_lines, find_role
 from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.grading.trial_selection import PartialAssignment, needs_every_trial, select_trials
@@ -67,6 +67,7 @@ class ProgramNumber:
     line: int
     value: float
     role: NumberRole
+    lines: frozenset[int]  # its line, and those that use the constant
 
     @property
     def column(self) -> int:
@@ -119,7 +120,9 @@ def collect_numbers(submission: Submission, assignment: Assignment) -> list[Prog
         found_numbers += [(file, tree, number, find_role(tree, number)) for number in tree.numbers]
     found_numbers.sort(key=lambda each: each[3] in ("index", "number"))
     return [
-        ProgramNumber(index, file, tree, number.start, number.end, number.line, number.value, role)
+        ProgramNumber(
+            index, file, tree, number.start, number.end, number.line, number.value, role, find_lines(tree, number)
+        )
         for index, (file, tree, number, role) in enumerate(found_numbers[:_MAX_NUMBERS])
     ]
 

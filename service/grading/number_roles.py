@@ -17,7 +17,7 @@ from sim.sentences import Sentence
 
 NumberRole = Literal[
     "turn", "distance", "time", "speed", "left speed", "right speed", "steering", "wait", "threshold", "loop", "index",
-    "number",
+    "range", "number",
 ]  # fmt: skip
 Direction = Literal["larger", "smaller", "other sign"]
 
@@ -28,7 +28,12 @@ _MOVES = frozenset({*_AMOUNTS, "on"})
 #: Parts of the names of objects that steer.
 _STEERING_NAMES = ("turn", "steer")
 #: Roles of numbers that have no fractions.
-WHOLE_ROLES: frozenset[NumberRole] = frozenset({"loop", "index"})
+WHOLE_ROLES: frozenset[NumberRole] = frozenset({"loop", "index", "range"})
+_NUMBER_SENTENCES = (
+    translatable("The number at %(place)s is too small."),
+    translatable("The number at %(place)s is too large."),
+    translatable("The number at %(place)s has the wrong sign."),
+)
 #: For each role: the sentence if the number must be larger, if it must be smaller, and if it needs the other sign.
 _SENTENCES: Mapping[NumberRole, tuple[str, str, str]] = MappingProxyType(
     {
@@ -88,11 +93,8 @@ _SENTENCES: Mapping[NumberRole, tuple[str, str, str]] = MappingProxyType(
             translatable("The index at %(place)s is too high."),
             translatable("The index at %(place)s counts from the wrong end."),
         ),
-        "number": (
-            translatable("The number at %(place)s is too small."),
-            translatable("The number at %(place)s is too large."),
-            translatable("The number at %(place)s has the wrong sign."),
-        ),
+        "range": _NUMBER_SENTENCES,
+        "number": _NUMBER_SENTENCES,
     }
 )
 
@@ -100,15 +102,26 @@ _SENTENCES: Mapping[NumberRole, tuple[str, str, str]] = MappingProxyType(
 def find_role(tree: SourceTree, number: NumberLiteral) -> NumberRole:
     """Return the role of a number. The number of a named constant has the role of the name's first use."""
     role = _find_role_of_node(tree, number.node)
-    parent = tree.find_parent(number.node)
-    if role != "number" or not isinstance(parent, ast.Assign):
+    if role != "number":
         return role
-    names = {each.id for each in parent.targets if isinstance(each, ast.Name)}
-    uses = (each for each in tree.nodes if isinstance(each, ast.Name) and each.id in names)
-    roles = [_find_role_of_node(tree, each) for each in uses if isinstance(each.ctx, ast.Load)]
+    roles = [_find_role_of_node(tree, each) for each in _list_uses(tree, number)]
     if {"left speed", "right speed"} <= set(roles):
         return "speed"
     return next((each for each in roles if each != "number"), "number")
+
+
+def find_lines(tree: SourceTree, number: NumberLiteral) -> frozenset[int]:
+    """Return the line of a number. For a named constant, add the lines where the name is used."""
+    return frozenset({number.line, *(each.lineno for each in _list_uses(tree, number))})
+
+
+def _list_uses(tree: SourceTree, number: NumberLiteral) -> list[ast.Name]:
+    """Return the uses of the names to which a number is assigned; empty if it is not assigned."""
+    parent = tree.find_parent(number.node)
+    targets = parent.targets if isinstance(parent, ast.Assign) else []
+    names = {each.id for each in targets if isinstance(each, ast.Name)}
+    uses = (each for each in tree.nodes if isinstance(each, ast.Name) and each.id in names)
+    return [each for each in uses if isinstance(each.ctx, ast.Load)]
 
 
 def describe_direction(role: NumberRole, direction: Direction, place: str) -> Sentence:
@@ -130,22 +143,33 @@ def find_direction(old: float, new: float, role: NumberRole) -> Direction:
 def _find_role_of_node(tree: SourceTree, node: ast.expr) -> NumberRole:
     if is_index(tree, node):
         return "index"
-    if is_range_argument(tree, node):
-        return "loop"
+    parent = tree.find_parent(node)
+    if isinstance(parent, ast.Call) and is_range_argument(tree, node):
+        # The first of several arguments is the start, and the third is the step.
+        return "loop" if node is parent.args[min(1, len(parent.args) - 1)] else "range"
+    if isinstance(parent, ast.Compare):
+        return "threshold"
     child: ast.AST = node
     for parent in tree.iterate_ancestors(node):
-        if isinstance(parent, ast.Compare):
-            return "threshold"
         if isinstance(parent, ast.Call):
             role = _find_role_of_argument(parent, child)
             outer_call = tree.find_parent(parent)
             if role == "speed" and isinstance(outer_call, ast.Call):  # the argument of SpeedPercent
                 return _find_role_of_argument(outer_call, parent)
             return role
-        if not isinstance(parent, ast.UnaryOp | ast.BinOp | ast.keyword):
+        # The role says what a larger number does, so no divisor and nothing that is subtracted has one.
+        is_direct = isinstance(parent, ast.UnaryOp | ast.keyword) or (
+            isinstance(parent, ast.BinOp)
+            and (isinstance(parent.op, ast.Add | ast.Mult) or (parent.left is child and not _is_power(parent)))
+        )
+        if not is_direct:
             return "number"
         child = parent
     return "number"
+
+
+def _is_power(node: ast.BinOp) -> bool:
+    return isinstance(node.op, ast.Pow | ast.Mod)
 
 
 def _find_role_of_argument(call: ast.Call, argument: ast.AST) -> NumberRole:

@@ -34,12 +34,13 @@ _MAX_TRIES_WITHOUT_EFFECT = 2
 _MAX_FACTOR, _MIN_STEP, _MAX_STEP = 4.0, math.log(1.05), math.log(1.4)
 _GRID_SHARE = 0.8
 #: About the CPU seconds of a run, of each of its ticks and of each line that it reaches. They choose the grid's steps.
-_RUN_SECONDS, _TICK_SECONDS, _LINE_SECONDS = 0.03, 0.00003, 0.00005
+_RUN_SECONDS, _TICK_SECONDS, _LINE_SECONDS = 0.03, 0.00006, 0.00005
 #: The part of the CPU seconds before the bisection.
 _SEARCH_SHARE = 0.75
 #: The size of a change of the sign, which has no factor.
 _SIGN_SIZE = math.log(3)
 _ZERO_CHANGES = (1.0, -1.0, 0.5, -0.5, 2.0, -2.0, 10.0, -10.0, 50.0)
+_ROUND_VALUES = (0.1, 0.5, *range(1, 11), 90, 100, 180, 360)
 _FAR_FACTORS = (2.0, 0.5, 4.0, 0.25, -1.0, 6.0, 1 / 6, 10.0, 0.1, 0.0)
 #: Other numbers are compared up to this power of the smallest factor: the one that gives more marks is better.
 _RIVAL_POWER = 1.5
@@ -160,15 +161,20 @@ class _Search:
                 self.change = self._experiments.build_change(number, nearest_value) or self.change
 
     def _suggest_values(self) -> Iterator[Candidate]:
-        """Yield the numbers of the line that the recorded path suggests, with its factor."""
+        """Yield what the recorded path suggests, then the values of other numbers of the same kind on the line."""
         case = self._experiments.case
         plan = plan_run(case.submission, case.assignment, case.secret)
         clues = collect_clues(case.submission, plan, case.graded.trials, case.graded.criteria)
         scaled_line = find_scaled_line(clues, case.criterion.id)
         if scaled_line is not None:
             file, line, factor = scaled_line
-            numbers = (each for each in self._numbers if (each.file, each.line) == (file, line))
-            yield from ((each, each.value * factor) for each in numbers if each.value)
+            numbers = [each for each in self._numbers if each.file == file and line in each.lines and each.value]
+            # A number may also be a divisor.
+            yield from ((each, each.value * scale) for each in numbers for scale in (factor, 1 / factor))
+        for number, other in itertools.permutations(self._numbers, 2):
+            is_pair = (number.file, number.line) == (other.file, other.line) and "speed" in number.role
+            if is_pair and "speed" in other.role and abs(number.value) != abs(other.value):
+                yield number, math.copysign(other.value, number.value)
 
     def _has_no_effect(self, number: ProgramNumber) -> bool:
         """Return whether all values that were tried, at least two, left the recordings as they are."""
@@ -297,6 +303,10 @@ def _list_values(number: ProgramNumber, step: float, offset: float = 0.0) -> Ite
         yield number.value * math.exp(-size)
     if not offset:
         yield -number.value
+        # Only a round value may pass, which the grid does not contain.
+        sizes = (abs(number.value) * _MAX_FACTOR, abs(number.value) / _MAX_FACTOR)
+        round_values = (each for each in _ROUND_VALUES if sizes[1] <= each <= sizes[0] and each != abs(number.value))
+        yield from (math.copysign(each, number.value) for each in round_values)
 
 
 def _list_far_values(number: ProgramNumber) -> Iterator[float]:

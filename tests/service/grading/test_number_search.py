@@ -94,6 +94,10 @@ def test_the_search_stays_within_its_budget(runner: TrialRunner) -> None:
         ("for i in range(4):\n    x = 5", ["loop", "number"]),
         ("N = 4\nV = 40\nfor i in range(N): tank_drive.on(V, V)", ["loop", "speed"]),
         ("V = 40\nm.on(SpeedPercent(V))", ["speed"]),
+        # A larger number has the opposite effect, or none that is known.
+        ("MM = 44\ntank_drive.on_for_rotations(20, 20, mm / MM)", ["number", "left speed", "right speed"]),
+        ("if red - 5 > 2 * blue:\n    m.on(SpeedPercent(50 - 2 * x))", ["number", "number", "speed", "number"]),
+        ("for i in range(2, 8, 3): pass", ["range", "loop", "range"]),
     ],
 )  # fmt: skip
 def test_the_role_of_a_number_is_found(text: str, roles: list[str]) -> None:
