@@ -476,3 +476,33 @@ def test_the_share_of_a_step_is_told_as_it_is() -> None:
 def test_criterion_that_cannot_be_asked_is_refused(check: str, keys: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         criterion(check, **keys)
+
+
+def _report_track(text: str, tick: int) -> Recording:
+    """Return a run along x whose left sensor is over black from tick 30 to 60, and which says the text at this tick."""
+    run = recorded()
+    sums = run.ticks.left_sums.copy()
+    sums[30:60] = 0
+    ticks = replace(run.ticks, left_sums=sums)
+    return replace(run, ticks=ticks, spoken=(TimedText((tick + 0.5) / 30, text),))
+
+
+@pytest.mark.parametrize(("tick", "passes"), [(10, False), (45, True), (80, True)])
+def test_reports_count_after_the_reading_that_they_are_about(tick: int, passes: bool) -> None:
+    rule = criterion("reports", source="speech", expected=[[97]], after={"reflected": [0, 20]})
+    result = judged(rule, _report_track("97 mm", tick))
+    assert result.evidence[0].passed == passes
+    assert ("nothing after the left light sensor had read 0 to 20 %" in result.message) == (not passes)
+    never = criterion("reports", source="speech", expected=[[97]], after={"light": "right", "reflected": [0, 20]})
+    assert "after the right light sensor had read" in judged(never, _report_track("97 mm", tick)).message
+
+
+@pytest.mark.parametrize(("tick", "passes"), [(10, False), (45, True), (80, False)])
+def test_reports_count_in_their_zone(tick: int, passes: bool) -> None:
+    events = criterion("events", events=[{"text": "97", "zone": [0, 0, 2362, 1143]}])
+    sensor_x = judged(events, _report_track("97", 45)).evidence[0].measures[0].value
+    zone = [sensor_x - 5, 0, sensor_x + 5, 1143]
+    rule = criterion("reports", source="speech", expected=[[97]], zone=zone)
+    result = judged(rule, _report_track("97 mm", tick))
+    assert result.evidence[0].passed == passes
+    assert ("nothing while the left light sensor was at" in result.message) == (not passes)
