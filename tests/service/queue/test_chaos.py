@@ -26,6 +26,7 @@ def _assert_whole(tally: CampaignResults, grading_requests: int) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.longest
 def test_on_sqlite(tmp_path: Path) -> None:
     settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0)
     quiet = compute_expected_hashes()
@@ -41,6 +42,7 @@ def test_on_sqlite(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.longest
 def test_on_postgresql(tmp_path: Path) -> None:
     folder = Path(tempfile.mkdtemp(prefix="robomark-pg-"))
     with small_disk(folder, 400) as disk:

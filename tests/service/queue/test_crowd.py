@@ -138,6 +138,7 @@ def test_a_few_of_every_sort_on_postgresql(tmp_path: Path, postgresql: str) -> N
 
 
 @pytest.mark.long
+@pytest.mark.longest
 def test_a_hundred_and_fifty_among_floods_of_every_kind(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     floods = _floods(1, [*FLOODS, *OTHERS])

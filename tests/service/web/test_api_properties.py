@@ -21,7 +21,7 @@ from service.store.courses.assignment_versions import freeze_assignment
 from web import Web, web_in
 from web_world import make_world
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.longest]
 #: Excluded checks: we choose the path values and the caller, and the store may refuse requests that fit the
 #: description.
 _NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
@@ -73,7 +73,8 @@ def _try(operation: Any, mode: GenerationMode, tokens: dict[str, dict[str, str]]
             case.path_parameters[name] = values.get(name, case.path_parameters[name])
         for who, token in tokens.items():
             note(f"as {who}")
-            answer = case.call(base_url="http://localhost", headers=token)
+            # The default of 10 s can be too short while other processes compute.
+            answer = case.call(base_url="http://localhost", headers=token, timeout=300)
             case.validate_response(answer, excluded_checks=_NOT_TOLD)
 
     answers()
