@@ -60,7 +60,7 @@ def test_the_database_refuses_a_second_job_that_stands(store: Store) -> None:
         session.execute(update(Job).values(standing=Standing.STANDS))
 
 
-@pytest.mark.parametrize("seed", quick_first(range(6), 2))
+@pytest.mark.parametrize("seed", quick_first(range(4)))
 def test_one_job_stands_after_any_order_of_actions(store: Store, seed: int) -> None:
     chance = random.Random(seed)
     accept_batch(store, "class", [grading_request(name) for name in ("ada", "bob")], [], max_attempts=3)
