@@ -70,7 +70,8 @@ class BudgetSpent(RobomarkError):
 class RerunOutcome:
     """The result of one criterion with the reruns in place of the recorded trials.
 
-    ``passed`` and ``failed`` are indices of trials in the grade. ``is_whole`` says whether every trial that the
+    ``passed`` and ``failed`` are indices of trials in the grade; ``failed_before`` are those that failed when they were
+    recorded. ``is_whole`` says whether every trial that the
     criterion judges was run again, so that ``marks`` are those of the exchange; otherwise they mix old and new trials.
     """
 
@@ -78,6 +79,7 @@ class RerunOutcome:
     max_marks: Decimal
     passed: frozenset[int]
     failed: frozenset[int]
+    failed_before: frozenset[int]
     is_whole: bool
 
 
@@ -96,12 +98,15 @@ class Rerun:
         return tuple(self.recordings)
 
     def passes(self, criterion: str) -> bool:
-        """Return whether a criterion loses nothing: all its marks, or every trial if only some were run again."""
+        """Return whether a criterion loses nothing that it lost before.
+
+        It gets all marks, or, if only some trials were run again, each of them passes, and one failed before.
+        """
         outcome = self.outcomes[criterion]
         if outcome.is_whole:
             return outcome.marks >= outcome.max_marks
         judged_trials = (outcome.passed | outcome.failed) & self.recordings.keys()
-        return bool(judged_trials) and not judged_trials & outcome.failed
+        return bool(judged_trials & outcome.failed_before) and not judged_trials & outcome.failed
 
     def loses(self, criterion: str) -> bool:
         """Return whether a criterion still loses marks in a trial that was run again."""
@@ -134,6 +139,9 @@ class RerunEngine:
         # Statements are recorded for the marks of the grade only.
         self._trial_plan = plan.to_hidden_plan()
         self.assignment: Assignment = plan.assignment
+        self._failed_before = {
+            result.id: frozenset(each.trial for each in result.evidence if not each.passed) for result in grade.criteria
+        }
         self.lost_criteria = {each.id: each for each in grade.criteria if each.marks < each.max_marks}
         self.results: Mapping[int, TrialResult] = {
             index: result for index, result in enumerate(grade.trials) if result.visibility in visibilities
@@ -301,6 +309,7 @@ class RerunEngine:
             result.max_marks,
             frozenset(indices[each.trial] for each in result.evidence if each.passed),
             frozenset(indices[each.trial] for each in result.evidence if not each.passed),
+            self._failed_before.get(result.id, frozenset()),
             not is_withheld and not result.unjudged and set(self.list_trials(result.id)) <= recordings.keys(),
         )
 

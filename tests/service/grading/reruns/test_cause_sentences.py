@@ -55,6 +55,7 @@ def reruns(draw: st.DrawFn, exchanges: st.SearchStrategy[tuple[Exchange, ...]]) 
     trials = range(draw(st.integers(1, 3)))
     own, other = draw(ANSWERS), draw(ANSWERS)
     passed = frozenset(trial for trial in trials if draw(st.booleans()))
+    failed_before = frozenset(trial for trial in trials if draw(st.booleans()))
     is_whole = draw(st.booleans())
     max_marks = Decimal(draw(st.sampled_from(["1", "4", "2.50"])))
     lost = Decimal(0) if draw(st.booleans()) else Decimal("0.5")
@@ -62,7 +63,7 @@ def reruns(draw: st.DrawFn, exchanges: st.SearchStrategy[tuple[Exchange, ...]]) 
         draw(exchanges),
         {trial: recorded(messages=talk(*(("PY::a", each) for each in own))) for trial in trials},
         {trial: recorded(messages=talk(*(("PY::a", each) for each in other))) for trial in trials},
-        {"c": RerunOutcome(max_marks - lost, max_marks, passed, frozenset(trials) - passed, is_whole)},
+        {"c": RerunOutcome(max_marks - lost, max_marks, passed, frozenset(trials) - passed, failed_before, is_whole)},
     )
 
 
@@ -118,7 +119,15 @@ CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
 def passes(rerun: Rerun) -> bool:
     """Return whether nothing was lost, by the definition in the documentation."""
     outcome = rerun.outcomes["c"]
-    return outcome.marks == outcome.max_marks if outcome.is_whole else not outcome.failed
+    if outcome.is_whole:
+        return outcome.marks == outcome.max_marks
+    return not outcome.failed and bool(outcome.failed_before)
+
+
+def loses(rerun: Rerun) -> bool:
+    """Return whether marks are still lost."""
+    outcome = rerun.outcomes["c"]
+    return outcome.marks < outcome.max_marks if outcome.is_whole else bool(outcome.failed)
 
 
 def with_part(cause: Cause, *names: str) -> Rerun:
@@ -151,7 +160,7 @@ def check_parts(text: str, cause: Cause) -> None:
         if f"the {part} loses the marks" in text:
             check_result(text.split(": the ")[0], with_part(cause, part))
         if f"ith the reference's {part} in place of yours, your {other} still loses" in text:
-            assert not passes(with_part(cause, part))
+            assert loses(with_part(cause, part))
     if "do not fit together" in text:
         first, second = text.split(". ")[:2]
         check_result(first, with_part(cause, "responder"))
@@ -162,11 +171,11 @@ def check_parts(text: str, cause: Cause) -> None:
         if "loses no marks" in text:
             assert passes(with_part(cause, name))
         else:
-            assert not passes(with_part(cause, *others))
+            assert loses(with_part(cause, *others))
     for name in re.findall(r"With the reference's (\w+)\.py in place", text):
         check_result(text, with_part(cause, name))
     for name in re.findall(r"your (\w+)\.py still loses", text):
-        assert not passes(with_part(cause, *(each for each in ("parser", "agent", "logger") if each != name)))
+        assert loses(with_part(cause, *(each for each in ("parser", "agent", "logger") if each != name)))
 
 
 def check_answers(text: str, cause: Cause) -> None:
@@ -276,7 +285,7 @@ def test_sentence_claims_only_what_the_reruns_showed(kind: CauseKind, data: st.D
 
 @pytest.mark.parametrize(("reveals", "for_staff"), [(0, [True, True]), (1, [False, True]), (2, [False, False])])
 def test_only_so_many_hidden_causes_are_revealed(reveals: int, for_staff: Sequence[bool]) -> None:
-    outcome = RerunOutcome(Decimal(4), Decimal(4), frozenset({0}), frozenset(), True)
+    outcome = RerunOutcome(Decimal(4), Decimal(4), frozenset({0}), frozenset(), frozenset({0}), True)
     rerun = Rerun((WithoutLightNoise(),), {0: recorded()}, {0: recorded()}, {"a": outcome, "b": outcome, "c": outcome})
     causes = [
         Cause("a", "conditions", (rerun,), is_hidden=True),

@@ -137,6 +137,13 @@ def test_halves_that_do_not_fit_together(runner: TrialRunner) -> None:
     assert causes["says"].endswith("Your program and your responder do not fit together.")
 
 
+def test_visible_trials_prove_nothing_for_marks_that_another_criterion_withholds(runner: TrialRunner) -> None:
+    # The responder loses the marks of a criterion with hidden trials, which the criterion "finishes" needs.
+    causes = explained(runner, "image-parser", responder=('{"typ": kind', '{"typ": kind.lower()'))
+    assert "the responder loses the marks" in causes["dictionary"]
+    assert not any("do not fit together" in text for text in causes.values())
+
+
 def test_same_causes_twice_and_without_a_reference_no_parts(runner: TrialRunner) -> None:
     assignment, reference = read("echo-responder")
     submission = exchanged(reference, responder=("Python saw >>", "Python saw >"))
