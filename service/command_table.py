@@ -44,6 +44,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "overview": Command("batch.overview:show_overview", "Show an overview of a batch."),
                 "similar": Command("batch.similar:similar", "Show similar submissions, for staff."),
                 "export": Command("batch.export:export", "Export the marks of a batch for another program."),
+                "moderation": Command("batch.moderation:moderation", "Write a sheet for external examiners."),
                 "pause": Command("batch.control:pause", "Pause a batch: start no more jobs."),
                 "resume": Command("batch.control:resume", "Resume a paused batch."),
                 "cancel": Command("batch.control:cancel", "Cancel the unfinished jobs of a batch."),

@@ -246,9 +246,14 @@ def render_part(template: str, language: Language, **context: object) -> Markup:
     return Markup(_create_environment(language).get_template(template).render(**context))
 
 
-def render_page(template: str, **context: object) -> str:
-    """Render a page from ``templates`` in English, with the report style and a policy without loading or scripts."""
-    return _render_secured_page(template, _read_styles("report.css"), "", context, ENGLISH)
+def render_page(
+    template: str,
+    language_of_page: Language = ENGLISH,
+    styles: tuple[str, ...] = ("report.css",),
+    **context: object,
+) -> str:
+    """Render a page from ``templates`` with these style sheets, and a policy without loading or scripts."""
+    return _render_secured_page(template, _read_styles(*styles), "", context, language_of_page)
 
 
 def _encode_replay(replay: Mapping[str, Any]) -> Markup:
@@ -284,7 +289,7 @@ def _create_environment(language: Language) -> Environment:
     return environment
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _read_styles(*names: str) -> str:
     folder = files("service.reports").joinpath("templates")
     return "\n" + "".join(folder.joinpath(name).read_text(encoding="utf-8") for name in names)

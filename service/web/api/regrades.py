@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from service.grading.pass_mark import PASS_SHARE
 from service.operations import regrades as operations
 from service.operations.exports import ExportRequest, download
+from service.operations.moderation import download_sheet
 from service.operations.types import ChangeStage, JobState, Role, Standing
 from service.reports.formats import FORMATS
 from service.web.access import RowName
@@ -295,6 +296,24 @@ async def worksheet(
         raise HTTPException(422, "The worksheet is not in UTF-8; upload the original file from Moodle.") from None
     export_request = ExportRequest("moodle-worksheet", published, text)
     return await run_in_threadpool(_respond_with_export, context, access, batch_id, export_request)
+
+
+@router.get("/courses/{course_id}/batches/{batch_id}/moderation", responses=_FILE_RESPONSES, response_class=Response)
+def moderation(
+    access: ReadAccess,
+    context: Context,
+    batch_id: RowName,
+    assignment: Annotated[
+        str, Query(max_length=100, description="An assignment of the batch; needed if it has several.")
+    ] = "",
+) -> Response:
+    """Return the moderation sheet of an assignment in the batch as an HTML page, for external examiners.
+
+    It contains the task, statistics, marks, adjusted marks, appeals and versions. Hidden names stay hidden.
+    """
+    with hold_slot(context.batch_exports.get_slot(access.actor.person_id), EXPORT_IN_PROGRESS):
+        sheet = download_sheet(context.service, access.actor, access.course_id, batch_id, assignment)
+    return respond_with_attachment(sheet.data, sheet.name, sheet.media_type)
 
 
 def _respond_with_export(

@@ -1,4 +1,4 @@
-"""Downloads of a batch's grades, in every format of the command line.
+"""Downloads of a batch's grades, in every format of the command line, and its moderation sheets.
 
 ``service.reports`` writes the formats. Hidden names are hidden in files, too.
 """
@@ -8,15 +8,17 @@ from __future__ import annotations
 import codecs
 from typing import Annotated
 
-from fastapi import APIRouter, File, Form, Query, UploadFile
+from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi.responses import Response
 
 from service.operations.exports import ExportRequest, download
+from service.operations.moderation import download_sheet
 from service.operations.types import Role
 from service.web.access import CourseInstructor, ReaderInCourse, RowName
 from service.web.api_uploads import MAX_TABLE_BYTES
 from service.web.attachments import respond_with_attachment
 from service.web.context import EXPORT_IN_PROGRESS, Context, WebContext, hold_slot
+from service.web.language import detect_language
 from service.web.request_bodies import takes_upload
 from sim.errors import UsageError
 
@@ -35,6 +37,22 @@ def export(
 ) -> Response:
     """Return the current grades in the requested format."""
     return _respond_with_export(access, context, batch_id, ExportRequest(form, published))
+
+
+@router.get("/moderation")
+def download_moderation_sheet(
+    request: Request,
+    access: CourseInstructor,
+    context: Context,
+    batch_id: RowName,
+    assignment: Annotated[str, Query(max_length=100)] = "",
+) -> Response:
+    """Return the moderation sheet of an assignment in the batch."""
+    with hold_slot(context.batch_exports.get_slot(access.actor.person_id), EXPORT_IN_PROGRESS):
+        sheet = download_sheet(
+            context.service, access.actor, access.course_id, batch_id, assignment, detect_language(request)
+        )
+    return respond_with_attachment(sheet.data, sheet.name, sheet.media_type)
 
 
 @router.post("/worksheet")

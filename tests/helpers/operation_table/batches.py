@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from interfaces import Row
-from service.operations import batches, exports, regrades, similarity
+from service.operations import batches, exports, moderation, regrades, similarity
 from zips import zipped
 
 _RESPONDER = "def responder(msg):\n    return msg\n"
@@ -156,6 +156,12 @@ ROWS = {
         "batch export {batch_id} --format typo", _STUDENTS, (422, "")),
     "export no such batch": _read(exports.download, "batches/nothing/export", {"format": "csv"},
         "batch export nothing --format csv", _STUDENTS, _NOTHING),
+    "moderation sheet": _read(moderation.download_sheet, "batches/{batch_id}/moderation",
+        {"assignment": "echo-responder"}, "batch moderation {batch_id} -a echo-responder", _STUDENTS),
+    "moderation sheet of another assignment": _read(moderation.download_sheet, "batches/{batch_id}/moderation",
+        {"assignment": "typo"}, "batch moderation {batch_id} -a typo", _STUDENTS, (404, "typo")),
+    "moderation sheet of no such batch": _read(moderation.download_sheet, "batches/nothing/moderation",
+        {"assignment": "echo-responder"}, "batch moderation nothing", _STUDENTS, _NOTHING),
     "similar": _read(similarity.show_similar, "batches/{batch_id}/similar", {}, "batch similar {batch_id}", _STUDENTS),
     "similar in no such batch": _read(similarity.show_similar, "batches/nothing/similar", {},
         "batch similar nothing", _STUDENTS, _NOTHING),

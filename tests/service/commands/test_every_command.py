@@ -68,6 +68,7 @@ SHOWING = {
     "batch regrade-one GRADE": "grade job",
     "batch grade-over-limit OVER": "grade",
     "batch overview BATCH": "batch classes missing refusals",
+    "batch moderation BATCH -o sheet.html": "batch assignment output bytes",
     "assignments list": "assignments",
     "assignments show echo-responder": (
         "id title section description version marks background robot program responder given criteria scenarios"
