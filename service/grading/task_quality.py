@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.grading.class_statistics import MarkedCriterion, MarkedSubmission
-from sim.sentences import Sentence, join_with_and
+from sim.sentences import Sentence, join_sentences, join_with_and
 
 #: The smallest batch with figures.
 MIN_SUBMISSIONS = 10
@@ -276,7 +276,7 @@ def _find_undiscriminating(marks: _Marks, qualities: Sequence[CriterionQuality])
             continue
         sentence = Sentence(
             "%(title)s: strong submissions lose its marks about as often as weak ones. Its discrimination is "
-            "%(value).2f (95 %% interval %(low).2f to %(high).2f), expected at least %(good).1f.",
+            "%(value).2f (95 %%: %(low).2f to %(high).2f), expected at least %(good).1f.",
             title=quality.title,
             value=quality.discrimination,
             low=quality.discrimination_interval.low,
@@ -345,13 +345,16 @@ def _find_overfit(marks: _Marks, hidden_shares: HiddenShares | None) -> Iterator
         return
     n = len(marks.shares)
     if hidden_shares.overfitted >= max(_MIN_OVERFITTED, _MIN_OVERFITTED_SHARE * n):
-        sentence = Sentence(
-            "%(count)s of %(n)s submissions have all marks of the criteria without hidden trials, but less than half "
-            "of the marks of the others. The mean shares of marks are %(visible).0f %% and %(hidden).0f %%.",
+        counts = Sentence(
+            "%(count)s of %(n)s submissions have all marks without hidden trials, but less than half of the marks with "
+            "hidden trials.",
             count=hidden_shares.overfitted,
             n=n,
+        )
+        shares = Sentence(
+            "The mean shares of marks are %(visible).0f %% and %(hidden).0f %%.",
             visible=100 * hidden_shares.visible,
             hidden=100 * hidden_shares.hidden,
         )
         criteria = tuple(each.id for each in marks.criteria if each.has_hidden_trials)
-        yield QualityFinding("overfit", criteria, sentence)
+        yield QualityFinding("overfit", criteria, join_sentences(counts, shares))
