@@ -74,7 +74,8 @@ class NumberSearch:
             return None
         place = Sentence("line %(line)s of %(name)s", line=change.line, name=change.file)
         sentence = describe_direction(change.role, change.direction, place)
-        if change.is_alone_on_line:
+        # The sentence about the left and the right speed is about both.
+        if change.is_alone_on_line or change.role in ("left speed", "right speed"):
             return sentence
         return Sentence("%(sentence)s This is about the number %(number)s.", sentence=sentence, number=change.old)
 
