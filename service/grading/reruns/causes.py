@@ -90,7 +90,8 @@ def find_causes(
         found_causes: list[Cause] = []
         try:
             for finder in (*main_finders, *finders):
-                found_causes += itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes))
+                for cause in itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes)):
+                    found_causes.append(cause)  # at once, because the finder may use up the budget
             if all(each.kind == "parts" for each in found_causes):
                 found_causes += _find_line(engine, criterion.id, found_causes)
             if not found_causes:
@@ -276,14 +277,17 @@ def find_smallest(items: Sequence[Item], check: Callable[[Sequence[Item]], Rerun
     best = check(items) if items else None
     if best is None or len(items) == 1:
         return best
-    for item in items:
-        single = check((item,))
-        if single is not None:
-            return single
-    needed = list(items)
-    for item in items:
-        fewer = [each for each in needed if each is not item]
-        rerun = check(fewer) if len(fewer) > 1 else None
-        if rerun is not None:
-            best, needed = rerun, fewer
+    try:
+        for item in items:
+            single = check((item,))
+            if single is not None:
+                return single
+        needed = list(items)
+        for item in items:
+            fewer = [each for each in needed if each is not item]
+            rerun = check(fewer) if len(fewer) > 1 else None
+            if rerun is not None:
+                best, needed = rerun, fewer
+    except BudgetSpent:
+        return best  # it passes, but it may not be the smallest
     return best

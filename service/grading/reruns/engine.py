@@ -35,6 +35,8 @@ from submissions.criteria.code import PythonCheck
 from submissions.seeds import PUBLIC_SECRET, SeedSource
 
 _VISIBLE = "visible"
+#: How much dearer than the dearest run so far the next one may be.
+_SAFETY = 1.3
 #: CPU seconds of a run with a changed line.
 _MAX_CHANGED_SECONDS = 0.6
 
@@ -160,7 +162,7 @@ class RerunEngine:
     def start_cause(self, budget: Budget = DEFAULT_BUDGET) -> None:
         """Begin with a full budget. Reruns that are known already cost nothing."""
         self._budget, self._runs, self._cpu_seconds = budget, 0, 0.0
-        self._dearest_seconds = 0.0  # of one run
+        self._dearest_seconds = self._dearest_judging_seconds = 0.0  # of one run, and of judging once
 
     @property
     def has_exchangeable_parts(self) -> bool:
@@ -218,12 +220,19 @@ class RerunEngine:
         if not judges_each_trial or not failed_trials:
             return self.rerun(trials, exchanges)
         first = self.rerun(failed_trials[:1], exchanges)
-        if not first.passes(criterion) or len(trials) == 1:
+        if not first.passes(criterion) or len(trials) == 1 or not self._can_pay_for(trials, exchanges):
             return first
         try:
             return self.rerun(trials, exchanges)
         except BudgetSpent:
             return first
+
+    def _can_pay_for(self, trials: Sequence[int], exchanges: Sequence[Exchange]) -> bool:
+        """Return whether the rest of the budget probably pays for these trials, by the dearest run so far."""
+        keys = tuple(exchange.key for exchange in exchanges)
+        count = sum((index, keys) not in self._recordings for index in trials)
+        seconds = self._cpu_seconds + self._dearest_judging_seconds + count * _SAFETY * self._dearest_seconds
+        return self._runs + count <= self._budget.runs and seconds < self._budget.cpu_seconds
 
     def rerun(self, trials: Sequence[int], exchanges: Sequence[Exchange]) -> Rerun:
         """Run these trials again with all the exchanges, and judge the criteria with them.
@@ -246,7 +255,9 @@ class RerunEngine:
             recordings,
             self._judge(recordings, exchanges),
         )
-        self._cpu_seconds += time.process_time() - start
+        judging_seconds = time.process_time() - start
+        self._cpu_seconds += judging_seconds
+        self._dearest_judging_seconds = max(self._dearest_judging_seconds, judging_seconds)
         self._reruns[tuple(trials), keys] = rerun
         return rerun
 
@@ -254,9 +265,9 @@ class RerunEngine:
         known_recording = self._recordings.get((index, keys))
         if known_recording is not None:
             return known_recording
-        seconds_left = self._budget.cpu_seconds - self._cpu_seconds
+        seconds_left = self._budget.cpu_seconds - self._cpu_seconds - self._dearest_judging_seconds
         # A run that is as dear as the dearest so far must still fit.
-        if self._runs >= self._budget.runs or seconds_left <= self._dearest_seconds:
+        if self._runs >= self._budget.runs or seconds_left <= _SAFETY * self._dearest_seconds:
             raise BudgetSpent
         self._runs += 1
         # A changed line can make a loop endless, which must not use up the budget.
