@@ -64,7 +64,8 @@ class Bridge:
         self.chain = HashChain()
         self.world = build_world(spec, arena, camera, self.chain)
         link = build_link(spec.channel, arena, lambda: self.world.pose)
-        self.conversation = Conversation(spec.channel, spec.seed, self.chain, link, spec.never_lost)
+        channel_seed = spec.seed if spec.channel_seed is None else spec.channel_seed
+        self.conversation = Conversation(spec.channel, channel_seed, self.chain, link, spec.never_lost)
         self.printed: list[TimedText] = []
         self.spoken: list[TimedText] = []
         self.images: list[Image] = []

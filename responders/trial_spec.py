@@ -144,10 +144,16 @@ class TrialSpec:
     number: int = 1  # the robot's number, as its program sees it
     records_lines: bool = True  # whether the recording has the lines of the program, for hints
     noise_seed: int | None = None  # seed of the noise; None: the world's
+    motor_seed: int | None = None  # seed of the noise of the wheels; None: that of the other noise
+    channel_seed: int | None = None  # seed of the channel; None: the world's
     never_lost: frozenset[int] = frozenset()  # numbers of texts that chance does not lose, nor their answers
 
     def build_partner_spec(self, partner: PartnerSpec) -> TrialSpec:
         """Return the trial as the second robot sees it, with its own seeds."""
+
+        def derive_seed(seed: int | None) -> int | None:
+            return None if seed is None else RandomStream(seed, "second robot").integer(0)
+
         return replace(
             self,
             program=partner.program,
@@ -157,5 +163,7 @@ class TrialSpec:
             child_seed=RandomStream(self.seed if partner.given else self.child_seed, "second robot").integer(1),
             partner=None,
             number=2,
-            noise_seed=None if self.noise_seed is None else RandomStream(self.noise_seed, "second robot").integer(0),
+            noise_seed=derive_seed(self.noise_seed),
+            motor_seed=derive_seed(self.motor_seed),
+            channel_seed=derive_seed(self.channel_seed),
         )

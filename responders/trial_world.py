@@ -30,7 +30,18 @@ def format_reading(reading: float | list[float]) -> str:
 def build_world(spec: TrialSpec, arena: Arena, camera: LightCamera, chain: HashChain) -> World:
     """Return the world at the start of the trial."""
     noise_seed = spec.seed if spec.noise_seed is None else spec.noise_seed
-    return World(spec.robot, arena, camera, spec.pose, spec.noise, noise_seed, chain, spec.physics, spec.tick)
+    return World(
+        spec.robot,
+        arena,
+        camera,
+        spec.pose,
+        spec.noise,
+        noise_seed,
+        chain,
+        spec.physics,
+        spec.tick,
+        motor_seed=spec.motor_seed,
+    )
 
 
 def build_robot_state(world: World, spec: TrialSpec) -> dict[str, Any]:

@@ -43,6 +43,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
                 "status": Command("batch.status:status", "Show the progress, marks and statistics of a batch."),
                 "overview": Command("batch.overview:show_overview", "Show an overview of a batch."),
                 "similar": Command("batch.similar:similar", "Show similar submissions, for staff."),
+                "luck": Command("batch.luck:luck", "Show how much of the marks is luck, for staff."),
                 "export": Command("batch.export:export", "Export the marks of a batch for another program."),
                 "moderation": Command("batch.moderation:moderation", "Write a sheet for external examiners."),
                 "pause": Command("batch.control:pause", "Pause a batch: start no more jobs."),

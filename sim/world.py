@@ -87,8 +87,14 @@ class World:
         chain: HashChain,
         physics: Physics = COURSE_PHYSICS,
         tick: int = TICK,
+        *,
+        motor_seed: int | None = None,
     ) -> None:
-        """Create the world. ``tick`` is its length in units of simulated time; the equations assume 1/30 s."""
+        """Create the world. ``tick`` is its length in units of simulated time; the equations assume 1/30 s.
+
+        ``seed`` is that of the noise; the wheels' noise has ``motor_seed`` instead, if given.
+        """
+        motor_seed = seed if motor_seed is None else motor_seed
         self.robot = robot
         self._tick = tick
         self.clock = 0
@@ -100,8 +106,8 @@ class World:
             math.radians(pose.heading),
             noise.motor,
             noise.both_directions,
-            RandomStream(seed, "left wheel"),
-            RandomStream(seed, "right wheel"),
+            RandomStream(motor_seed, "left wheel"),
+            RandomStream(motor_seed, "right wheel"),
         )
         self._arena = arena
         self.obstacles = arena.obstacles

@@ -77,6 +77,8 @@ class Reruns:
 
 
 NO_RERUNS = Reruns()
+#: The random stream of the second robot's start jitter.
+_SECOND_START_JITTER = "second start jitter"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,16 @@ class Trial:
     channel: Channel
     sweep: Coordinates = ()
     second_pose: Pose | None = None  # start pose of the second robot
+
+    def redraw_start(self, seed: int) -> Trial:
+        """Return the trial with the jitter of its start poses drawn from another seed; the place stays."""
+        second_pose = self.second_pose
+        if second_pose is not None:
+            second_pose = _apply_offsets(
+                self.scenario, self.scenario.second_poses[self.place], seed, _SECOND_START_JITTER
+            )
+        pose = _compute_start_pose(self.scenario, self.place, dict(self.sweep), seed)
+        return replace(self, pose=pose, second_pose=second_pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +184,7 @@ class Assignment:
                         delay=sweep_values.get("delay", scenario.channel.delay),
                     ),
                     sweep,
-                    _apply_offsets(scenario, scenario.second_poses[pose_index], seed, "second start jitter")
+                    _apply_offsets(scenario, scenario.second_poses[pose_index], seed, _SECOND_START_JITTER)
                     if scenario.second_poses
                     else None,
                 )

@@ -6,15 +6,17 @@ An exchange changes the specification of a trial. Exchanges with the same ``key`
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from responders.source_file import SourceFile
 from responders.trial_spec import AgentSpec, EarlierAnswer, TrialSpec
 from service.grading.run_plan import RunPlan
+from sim.random_streams import RandomStream
 from sim.recording import SECOND, Message, Pose, Recording
 
+RedrawnStream = Literal["light noise", "motor noise", "messages"]
 ChannelEffect = Literal["duplication", "reordering", "corruption", "jitter"]
 #: A part of a submission: ``program``, ``responder``, ``second program``, or the name of an agent.
 PartName = str
@@ -68,6 +70,53 @@ class OtherNoise:
     def apply(self, spec: TrialSpec) -> TrialSpec:
         """Return the trial with the ingredient replaced."""
         return replace(spec, noise_seed=self.seed)
+
+
+@dataclass(frozen=True, slots=True)
+class OtherDraw:
+    """One random stream of each trial is drawn again, all others stay. ``number`` tells the draws of a stream apart."""
+
+    stream: RedrawnStream
+    number: int
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"draw {self.number} of {self.stream}"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        seed = draw_other_seed(spec.seed, self.stream, self.number)
+        noise_seed = spec.seed if spec.noise_seed is None else spec.noise_seed
+        motor_seed = noise_seed if spec.motor_seed is None else spec.motor_seed
+        match self.stream:
+            case "light noise":
+                return replace(spec, noise_seed=seed, motor_seed=motor_seed)
+            case "motor noise":
+                return replace(spec, motor_seed=seed)
+            case "messages":
+                return replace(spec, channel_seed=seed)
+
+
+@dataclass(frozen=True, slots=True)
+class OtherStart:
+    """The jitter of each start pose is drawn again. ``starts`` has the poses of both robots by the trial's seed."""
+
+    number: int
+    starts: Mapping[int, tuple[Pose, Pose | None]] = field(repr=False, compare=False)
+
+    @property
+    def key(self) -> str:
+        """The text that identifies the exchange."""
+        return f"draw {self.number} of start pose"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the trial with the ingredient replaced."""
+        pose, second_pose = self.starts[spec.seed]
+        partner = spec.partner
+        if partner is not None and second_pose is not None:
+            partner = replace(partner, pose=second_pose)
+        return replace(spec, pose=pose, partner=partner)
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +300,11 @@ class ChangedLine:
     def apply(self, spec: TrialSpec) -> TrialSpec:
         """Return the trial with the ingredient replaced."""
         return OtherSource(self.part, self.text).apply(spec)
+
+
+def draw_other_seed(seed: int, stream: str, number: int) -> int:
+    """Return the seed of another draw of a trial's random stream. Each trial and each stream has its own."""
+    return RandomStream(seed, f"other {stream}").integer(number)
 
 
 def apply_exchanges(spec: TrialSpec, exchanges: Sequence[Exchange]) -> TrialSpec:

@@ -131,7 +131,7 @@ _ASKING = {
     **{
         f"{line} --help": _HEAVY
         for line in ("run", "grade", "verify", "up", "worker", "doctor", "floors", "demo", "sandbox check",
-                     "batch submit", "batch similar", "batch export", "batch regrade", "batch pause",
+                     "batch submit", "batch similar", "batch luck", "batch export", "batch regrade", "batch pause",
                      "assignments check", "db purge")
     },
 }  # fmt: skip

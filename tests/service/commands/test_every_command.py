@@ -57,6 +57,7 @@ SHOWING = {
     "batch status BATCH": "batch pace jobs changes changes_summary ranks unpublished_regrades statistics history",
     "batch submit new -a echo-responder": "batch queued known refusals",
     "batch similar BATCH": "assignments",
+    "batch luck BATCH": "batch assignments",
     "batch pause BATCH": "batch changed waiting running",
     "batch resume BATCH": "batch changed waiting running",
     "batch cancel BATCH": "batch changed waiting running",

@@ -14,8 +14,10 @@ from responders.trial_spec import EarlierAnswer, ProgramSpec, ResponderSpec, Tri
 from service.grading.reruns.exchanges import (
     Exchange,
     MoreTime,
+    OtherDraw,
     OtherNoise,
     OtherSource,
+    OtherStart,
     VisibleStart,
     WithoutChannelEffect,
     WithoutLightNoise,
@@ -54,6 +56,9 @@ SPEC = TrialSpec(
         (WithoutLightNoise(), "noise"),
         (WithoutMotorNoise(), "noise"),
         (OtherNoise(7), "noise_seed"),
+        (OtherDraw("motor noise", 1), "motor_seed"),
+        (OtherDraw("messages", 1), "channel_seed"),
+        (OtherStart(1, {1: (Pose(1, 2, 3), None)}), "pose"),
         (WithoutMessageLoss(), "channel"),
         (WithoutMessageLoss(frozenset({3})), "never_lost"),
         (WithoutChannelEffect("corruption"), "channel"),
@@ -81,6 +86,16 @@ def test_scaled_conditions_are_between_both_ends() -> None:
     middle = ScaledConditions(0.5, easy, hard).apply(SPEC)
     assert (middle.noise, middle.channel.loss, middle.pose) == (Noise(4, 10), 0.2, Pose(300, 800, 45))
     assert ScaledConditions(1, easy, hard).apply(SPEC) == SPEC
+
+
+def test_other_light_noise_keeps_the_wheels_noise_and_other_streams_are_kept_too() -> None:
+    light = OtherDraw("light noise", 1)
+    assert light.apply(SPEC).motor_seed == SPEC.seed
+    assert light.apply(SPEC).noise_seed not in (None, SPEC.seed)
+    both = OtherDraw("motor noise", 1).apply(light.apply(SPEC))
+    assert both.noise_seed == light.apply(SPEC).noise_seed
+    assert both.motor_seed not in (SPEC.seed, both.noise_seed)
+    assert OtherDraw("light noise", 2).apply(SPEC).noise_seed != light.apply(SPEC).noise_seed
 
 
 def test_named_messages_are_not_lost_and_all_other_draws_stay() -> None:
