@@ -130,9 +130,11 @@ def _find_conditions(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
     """Yield the smallest set of noises and effects of the channel without which nothing is lost, then the chance."""
     trial = _choose_failed_trial(engine, criterion)
     conditions = _list_conditions(engine.trials[trial], engine.results[trial].recording)
-    smallest = find_smallest(conditions, lambda exchanges: _rerun_if_passing(engine, criterion, exchanges))
+    # One trial is enough to find the exchanges; all trials then show what they give.
+    smallest = find_smallest(conditions, lambda exchanges: _rerun_trial_if_passing(engine, criterion, trial, exchanges))
     if smallest is None:
         return
+    smallest = _rerun_if_passing(engine, criterion, smallest.exchanges) or smallest
     reruns = [smallest]
     if smallest.exchanges == (WithoutMessageLoss(),):
         messages = _list_lost_messages(engine.results[trial].recording)
@@ -260,6 +262,15 @@ def _list_lost_messages(recording: Recording) -> tuple[int, ...]:
 
 def _rerun_if_passing(engine: RerunEngine, criterion: str, exchanges: Sequence[Exchange]) -> Rerun | None:
     rerun = engine.rerun_criterion(criterion, exchanges)
+    return rerun if rerun.passes(criterion) else None
+
+
+def _rerun_trial_if_passing(
+    engine: RerunEngine, criterion: str, trial: int, exchanges: Sequence[Exchange]
+) -> Rerun | None:
+    if trial not in engine.list_failed_trials(criterion):
+        return _rerun_if_passing(engine, criterion, exchanges)
+    rerun = engine.rerun((trial,), exchanges)
     return rerun if rerun.passes(criterion) else None
 
 
