@@ -37,7 +37,7 @@ class Engine:
         (exchange,) = exchanges
         assert isinstance(exchange, ScaledConditions)
         failed = frozenset(trials) if exchange.conditions.light_noise >= self.fails_from else frozenset()
-        outcome = RerunOutcome(Decimal(0), Decimal(4), frozenset(trials) - failed, failed, frozenset({3}), False)
+        outcome = RerunOutcome(Decimal(0), Decimal(4), frozenset(trials) - failed, failed, frozenset(trials), False)
         return Rerun(tuple(exchanges), {3: recorded()}, {3: recorded()}, {"c": outcome})
 
 
