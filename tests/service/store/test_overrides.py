@@ -21,7 +21,7 @@ import report_builders
 from builders import accept_one, grading_request, prepared
 from service.batch_rows import build_rows
 from service.grading.class_statistics import to_marked_submission
-from service.grading.grade import Grade, StaffAdjustment
+from service.grading.grade import Grade, StaffAdjustment, VisibleFeedback
 from service.report_files import render_report_body
 from service.reports.formats import FORMATS
 from service.reports.formats.json_output import build_json_document
@@ -355,6 +355,16 @@ def test_what_was_set_is_told_where_the_message_is_of_visible_trials_alone() -> 
     view = build_student_view(replace(GRADE, criteria=(adjusted_result,), trials=trials)).grade.criteria[0].message
     assert view.startswith("Adjusted by staff from 5 to 6: seen again.")
     assert "5 of 6 images" not in view
+
+
+def test_statistics_know_which_criteria_have_hidden_trials(store: Store) -> None:
+    feedback = VisibleFeedback("seen")
+    criteria = (replace(GRADE.criteria[0], shown=feedback), GRADE.criteria[1])
+    batch, _ = _graded(store, replace(GRADE, criteria=criteria))
+    with store.reading() as session:
+        (marked,) = load_marked_submissions(session, job_lines.load_job_lines(session, batch))
+    assert [each.has_hidden_trials for each in marked.criteria] == [True, False]
+    assert marked.criteria == to_marked_submission(replace(GRADE, criteria=criteria)).criteria
 
 
 def test_who_is_excused_is_out_of_every_statistic(store: Store) -> None:
