@@ -78,8 +78,8 @@ def _explain_limit(fault: Fault, listing: Listing, statement: Statement, clues: 
     late_move = _find_late_move(loops[0], code) if loops and clues.is_stationary else None
     if late_move is not None:
         return Sentence(
-            "%(place)s: the loop waits for another reading, but the robot stands still: line %(line)s switches the "
-            "motors on only below the loop. Move line %(line)s above line %(loop)s",
+            "%(place)s: the loop waits for another reading, but the robot stands still. Move line %(line)s, which "
+            "switches the motors on, above line %(loop)s",
             place=listing.locate(loops[0].line),
             line=late_move.line,
             loop=loops[0].line,

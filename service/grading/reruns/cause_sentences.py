@@ -219,8 +219,8 @@ _SINGLE_PARTS: Mapping[str, str] = MappingProxyType(
 def _describe_parts_that_still_lose(losing: Sequence[str], parts: Sequence[str]) -> str:
     if set(losing) == {"program", "responder"} == set(parts):
         return Sentence(
-            "With the reference's responder in place of yours, your program still loses marks, and with the "
-            "reference's program in place of yours, your responder still loses marks."
+            "With the reference's responder, your program still loses marks. With the reference's program, your "
+            "responder still loses marks."
         )
     if len(losing) > 1:
         return Sentence(
@@ -241,9 +241,8 @@ def _describe_misfit(single: Mapping[str, Rerun], losing: Sequence[str], criteri
     """Describe parts each of which the reference's replaces without loss."""
     if set(losing) == {"program", "responder"} == set(single):
         return Sentence(
-            "With the reference's responder in place of yours, the same program %(first)s. With the reference's "
-            "program in place of yours, the same responder %(second)s. Your program and your responder do not fit "
-            "together.",
+            "With the reference's responder, the same program %(first)s. With the reference's program, the same "
+            "responder %(second)s. Your program and your responder do not fit together.",
             first=describe_result(single["responder"], criterion),
             second=describe_result(single["program"], criterion),
         )
