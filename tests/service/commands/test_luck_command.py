@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import nullcontext
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,13 +21,17 @@ from service.grading.trial_runner import TrialRunner
 from service.store.batches import stored_requests
 from service.store.batches.intake import accept_batch
 from service.store.queue import jobs
-from service.store.tables.submissions import Job
 from submissions.grading_request import GradingRequest
+from submissions.seeds import Secret
+
+#: With a fixed secret, the draws are the same in each run of the tests.
+SECRET = Secret("the secret of the luck tests, fixed")
 
 
 @pytest.fixture(autouse=True)
-def _warm_runner(monkeypatch: pytest.MonkeyPatch, runner: TrialRunner) -> None:
-    """Let the command use the processes of this session."""
+def _environment(monkeypatch: pytest.MonkeyPatch, runner: TrialRunner) -> None:
+    """Let the command use the secret, and the processes of this session."""
+    monkeypatch.setenv("ROBOMARK_SECRET", SECRET.text)
     monkeypatch.setattr(luck_report, "TrialRunner", lambda: nullcontext(runner))
 
 
@@ -36,19 +41,17 @@ def graded(tmp_path_factory: pytest.TempPathFactory, runner: TrialRunner) -> tup
     home = tmp_path_factory.mktemp("home")
     submissions = [chance_submission(each, guesses=each == "ada") for each in ("ada", "bob", "cyd")]
     requests = [GradingRequest(each, chance_assignment(), f"{each.student}.zip") for each in submissions]
-    with opened(settings_in(home)) as store:
+    with opened(settings_in(home, secret=SECRET)) as store:
         batch = accept_batch(store, "class", requests, [], max_attempts=2).id
         for _ in requests:
             claim = jobs.claim_job(store, "worker", 60)
             assert claim is not None
             with store.reading() as session:
                 request = stored_requests.load_grading_request(session, claim.job_id)
-            result = grade(request.submission, request.assignment, runner=runner)
+            result = grade(request.submission, request.assignment, secret=SECRET, runner=runner)
+            if request.submission.student == "cyd":
+                result = replace(result, secret_sha256="0" * 64)
             jobs.finish_job(store, claim, prepared(result), datetime.now(UTC))
-            # Grades from before there were secrets have the public seeds, which are the same in each run of the tests.
-            secret_sha256 = "0" * 64 if request.submission.student == "cyd" else None
-            with store.transaction() as session:
-                session.get_one(Job, claim.job_id).secret_sha256 = secret_sha256
     return home, batch
 
 
