@@ -115,7 +115,7 @@ def test_the_command_shows_staff_the_number(tmp_path: Path) -> None:
     program.write_text(reference.read_text().replace("SIDES = 4", "SIDES = 3"))
     ended = robomark("grade", program, "-a", "trace-a-square", "--nearest", "--json")
     document = json.loads(ended.stdout)
-    assert document["marks"] == 1
+    assert document["marks"] == 0
     [nearest] = document["nearest"]
     assert (nearest["line"], nearest["old"], nearest["new"], nearest["marks"]) == (2, "3", "4", 10)
     ended = robomark("grade", program, program, "-a", "trace-a-square", "--nearest")
