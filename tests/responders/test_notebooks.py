@@ -51,8 +51,9 @@ def test_the_course_notebook_gets_full_marks_for_each_of_its_programs(
     messaging: Path, runner: TrialRunner, name: str, cell: str, marks: int
 ) -> None:
     tested_assignment = find_assignment(name)
+    without_noise = tuple(each for each in tested_assignment.scenarios if not any(each.light_noise))
     graded_assignment = replace(
-        tested_assignment, parts=replace(tested_assignment.parts, cell=cell), scenarios=tested_assignment.scenarios[:1]
+        tested_assignment, parts=replace(tested_assignment.parts, cell=cell), scenarios=without_noise
     )
     result = grade(read_submission(messaging, required_parts=graded_assignment.parts), graded_assignment, runner=runner)
     lost = [each for each in result.criteria if each.marks < each.max_marks and each.id != "shape-in-noise"]
