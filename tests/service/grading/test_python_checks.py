@@ -161,7 +161,7 @@ def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
 def test_a_check_has_what_it_needs_when_the_submission_has_used_up_its_own(
     trusting: Assignment, runner: TrialRunner
 ) -> None:
-    few = replace(trusting, limits=replace(trusting.limits, all_cpu=1.5))
+    few = replace(trusting, limits=replace(trusting.limits, all_cpu=2.5))
     program = SourceFile("robot.py", "print('json [1]')\nwhile True: pass")
     checked_result, ended = grade(Submission("ada", program), few, runner=runner).criteria
     assert ended.marks == 0

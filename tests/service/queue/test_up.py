@@ -130,7 +130,7 @@ def test_all_of_it_comes_up_grades_tells_and_ends(tmp_path: Path) -> None:
 
         below = find_descendants(up.pid)
         up.send_signal(signal.SIGINT)
-        out, err = up.communicate(timeout=60)
+        out, err = up.communicate(timeout=150)
         assert (up.returncode, err) == (0, "")
         # Running jobs were finished within the time allowed, or requeued.
         assert re.fullmatch(r"stopped; running jobs returned to the queue: [01]", json.loads(out)["message"])
