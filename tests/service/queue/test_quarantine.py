@@ -38,7 +38,7 @@ from service.store import audit
 from service.store.batches import stored_requests
 from service.store.batches.intake import accept_batch
 from service.store.engine import Store, open_store
-from service.store.grades import results
+from service.store.grades import causes, results
 from service.store.installation import load_secret
 from service.store.queue import jobs, self_tests, workers
 from service.store.states import JobQueue, JobState, Standing
@@ -298,8 +298,9 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
         with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
             before = submit(range(10, 13))
             until(lambda: _unfinished(store) == 0)
+            until(lambda: causes.count_unexplained_grades(store) == 0)
             vouched = _last_right(store)
-            # Its next check is then some seconds away.
+            # It comes after the last search for causes, and the next check is then some seconds away.
             until(lambda: _last_right(store) != vouched)
             switch.touch()
             time.sleep(0.3)
