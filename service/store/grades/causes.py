@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from datetime import timedelta
 from typing import Any
 
-from sqlalchemy import ColumnElement, exists, func, select
+from sqlalchemy import ColumnElement, delete, exists, func, select
 from sqlalchemy.orm import Session
 
 from service.grading.grade import Grade, ShownCause
@@ -67,6 +67,13 @@ def _build_conditions(session: Session) -> tuple[ColumnElement[bool], ...]:
         Job.marks < Job.max_marks,
         ~has_causes,
     )
+
+
+@retry_conflicts
+def release_grade(store: Store, job_id: str) -> None:
+    """Undo the claim of a grade whose search was interrupted, so that it is searched later."""
+    with store.transaction() as session:
+        session.execute(delete(Artifact).where(Artifact.job_id == job_id, Artifact.name == CAUSES_NAME))
 
 
 @retry_conflicts

@@ -10,7 +10,7 @@ import pytest
 from builders import opened, settings_in
 from responders.source_file import SourceFile
 from service.grading.trial_runner import TrialRunner
-from service.queue.explaining_job import explain_next_grade
+from service.queue.explaining_job import explain_next_grade, is_student_waiting
 from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.reports.view import build_staff_view, build_student_view
 from service.settings import Settings
@@ -103,6 +103,23 @@ def test_failed_search_leaves_the_grade_without_causes(
         assert explain_next_grade(store, settings, runner) is None
         with store.reading() as session:
             assert results.load_grade(session, job_id).causes == ()
+
+
+def test_a_student_who_waits_interrupts_a_search_which_is_done_later(
+    settings: Settings, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened(settings) as store:
+        submit(store, settings, runner, wrong_echo("ada"))
+        assert not is_student_waiting(store)
+        other = GradingRequest(read_example("say-tm129", "reference"), find_assignment("say-tm129"), "ben.zip")
+        accept_submission(store, other, lane=JobQueue.INTERACTIVE, max_attempts=3)
+        assert is_student_waiting(store)
+        monkeypatch.setattr("service.queue.explaining_job._LOOK_SECONDS", 0.0)
+        assert explain_next_grade(store, settings, runner) is not None
+        assert causes.count_unexplained_grades(store) == 1
+        assert grade_next_job(store, settings, runner, "worker") is GradingOutcome.GRADED
+        assert explain_next_grade(store, settings, runner) is not None
+        assert causes.count_unexplained_grades(store) == 0
 
 
 def test_hidden_causes_are_counted_for_each_student(settings: Settings, runner: TrialRunner, tmp_path: Path) -> None:
