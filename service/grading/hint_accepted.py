@@ -29,9 +29,10 @@ def hint_about_other_words(clues: Clues) -> Iterator[str]:
         ("program", translatable("%(place)s prints %(text)s; the assignment requires %(required)s"), clues.printed),
         ("responder", translatable("%(place)s answers %(text)s; the assignment requires %(required)s"), clues.answers),
     )
+    titles = {each.title for each in clues.definition.criteria} if clues.definition is not None else set()
     for quotation in _QUOTED.findall(_join_task_lines(clues)):
         opening = quotation.partition("...")[0].strip()
-        if len(opening.split()) < 2 or _VARIABLE_TEXT.search(opening):
+        if len(opening.split()) < 2 or _VARIABLE_TEXT.search(opening) or quotation in titles:
             continue
         expected = ExpectedText(opening, "contains")
         if any(expected.is_met_by(text, ignore_case=True) for _, _, found in texts for text in found):
