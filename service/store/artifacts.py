@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
 
-from sqlalchemy import and_, delete, select
+from sqlalchemy import and_, delete, or_, select
 from sqlalchemy.orm import Session
 
 from service.store.tables.grades import Artifact
@@ -59,13 +59,15 @@ def load_files(session: Session, job_id: str, *, prefix: str = "") -> dict[str, 
 
 
 def load_each_files(
-    session: Session, job_ids: Collection[str], *, prefix: str = ""
+    session: Session, job_ids: Collection[str], *, prefix: str | tuple[str, ...] = ""
 ) -> Iterator[tuple[str, dict[str, File]]]:
-    """Yield each job id with its files, read in one statement and ordered by id.
+    """Yield each job id with its files, read in one statement and ordered by id. ``prefix`` as for ``str.startswith``.
 
     Only the files of one job are in memory at a time. Raises HostError if a file does not match its hash.
     """
-    has_prefix = and_(Artifact.job_id == Job.id, Artifact.name.startswith(prefix, autoescape=True))
+    prefixes = (prefix,) if isinstance(prefix, str) else prefix
+    is_named = or_(*(Artifact.name.startswith(each, autoescape=True) for each in prefixes))
+    has_prefix = and_(Artifact.job_id == Job.id, is_named)
     query = (
         select(Job.id, Artifact.name, Artifact.media_type, Artifact.sha256, Artifact.compressed)
         .outerjoin(Artifact, has_prefix)

@@ -88,7 +88,7 @@ def load_causes(session: Session, job_ids: Collection[str]) -> dict[str, StoredC
     if not job_ids:
         return {}
     return {
-        job_id: _read_file(files[CAUSES_NAME])
+        job_id: read_causes(files[CAUSES_NAME])
         for job_id, files in load_each_files(session, job_ids, prefix=CAUSES_NAME)
         if CAUSES_NAME in files
     }
@@ -119,7 +119,8 @@ def _build_file(stored_causes: StoredCauses) -> File:
     return File(CAUSES_NAME, "application/json", json.dumps(document).encode())
 
 
-def _read_file(file: File) -> StoredCauses:
+def read_causes(file: File) -> StoredCauses:
+    """Return the causes in a file of a job."""
     document: Mapping[str, Any] = json.loads(file.data)
     causes = tuple(ShownCause(**{**each, "files": tuple(each["files"])}) for each in document["causes"])
     grade = restore_sentences(replace(_EMPTY_GRADE, causes=causes), document["sentences"])

@@ -119,7 +119,7 @@ def load_original_grade(session: Session, job_id: str) -> Grade:
     """Load the grade of a job as the grader gave it. Raises UsageError if it has none."""
     from service.store.grades.recordings import from_bytes
 
-    return _require_grade(_load_original_grades(session, [job_id], from_bytes), job_id)
+    return replace(_require_grade(_load_original_grades(session, [job_id], from_bytes), job_id), causes=())
 
 
 def load_marks(session: Session, job_ids: Collection[str]) -> dict[str, Grade]:
@@ -139,7 +139,7 @@ def load_each_trials(session: Session, job_ids: Collection[str]) -> Iterator[tup
     """Yield each job id with its trials, which are empty without a grade. Keeps those of one job in memory."""
     from service.store.grades.recordings import from_bytes
 
-    return _load_trials(session, job_ids, from_bytes)
+    return ((job_id, trials) for job_id, trials, _ in _load_trials(session, job_ids, from_bytes))
 
 
 _LoadedGrades = Iterator[tuple[str, Grade]]
@@ -152,21 +152,15 @@ def _require_grade(loaded_grades: _LoadedGrades, job_id: str) -> Grade:
 
 
 def _apply_staff_changes(session: Session, job_ids: Collection[str], loaded_grades: _LoadedGrades) -> _LoadedGrades:
-    overrides_by_job, comments_by_job, causes_by_job = (
+    overrides_by_job, comments_by_job = (
         overrides.load_overrides(session, job_ids),
         comments.load_comments_by_job(session, job_ids),
-        causes.load_causes(session, job_ids),
     )
     for job_id, grade in loaded_grades:
         written_comments = tuple(WrittenComment(each.criterion, each.text) for each in comments_by_job.get(job_id, ()))
-        stored_causes = causes_by_job.get(job_id, _NO_CAUSES)
         yield (
             job_id,
-            replace(
-                _apply_overrides(grade, overrides_by_job.get(job_id, {})),
-                comments=written_comments,
-                causes=stored_causes.causes,
-            ),
+            replace(_apply_overrides(grade, overrides_by_job.get(job_id, {})), comments=written_comments),
         )
 
 
@@ -181,8 +175,8 @@ def _load_original_grades(
     session: Session, job_ids: Collection[str], decode_recording: Callable[[bytes], Recording]
 ) -> _LoadedGrades:
     stored_grades = _load_stored_grades(session, job_ids)
-    for job_id, trials in _load_trials(session, stored_grades, decode_recording):
-        yield job_id, stored_grades[job_id].build_grade(trials)
+    for job_id, trials, stored_causes in _load_trials(session, stored_grades, decode_recording):
+        yield job_id, replace(stored_grades[job_id].build_grade(trials), causes=stored_causes.causes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,18 +233,21 @@ def _build_head(job: Job, sha256: str, student: str, version: AssignmentVersion)
 
 def _load_trials(
     session: Session, job_ids: Collection[str], decode_recording: Callable[[bytes], Recording]
-) -> Iterator[tuple[str, tuple[TrialResult, ...]]]:
+) -> Iterator[tuple[str, tuple[TrialResult, ...], causes.StoredCauses]]:
+    """Yield the trials and the causes of each job, whose files are read in one statement."""
     query = select(TrialRow).where(TrialRow.job_id.in_(job_ids)).order_by(TrialRow.job_id, TrialRow.position)
     rows: dict[str, list[TrialRow]] = {}
     for row in session.scalars(query):
         rows.setdefault(row.job_id, []).append(row)
-    for job_id, files in artifacts.load_each_files(session, job_ids, prefix="recording-"):
+    for job_id, files in artifacts.load_each_files(session, job_ids, prefix=("recording-", causes.CAUSES_NAME)):
+        causes_file = files.get(causes.CAUSES_NAME)
         yield (
             job_id,
             tuple(
                 _build_trial(row, decode_recording(_find_recording(files, job_id, row.position)))
                 for row in rows.get(job_id, ())
             ),
+            _NO_CAUSES if causes_file is None else causes.read_causes(causes_file),
         )
 
 
