@@ -43,10 +43,11 @@ _MAX_CHANGED_SECONDS = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What the search for one cause may cost: trials run, and CPU seconds of the worker and its children."""
+    """What the search for one cause may cost: trials run, CPU seconds, and real seconds in which children sleep."""
 
     runs: int = 60
     cpu_seconds: float = 5.0
+    sleep_seconds: float = 5.0
 
 
 DEFAULT_BUDGET = Budget()
@@ -73,8 +74,8 @@ class RerunOutcome:
     """The result of one criterion with the reruns in place of the recorded trials.
 
     ``passed`` and ``failed`` are indices of trials in the grade; ``failed_before`` are those that failed when they were
-    recorded. ``is_whole`` says whether every trial that the
-    criterion judges was run again, so that ``marks`` are those of the exchange; otherwise they mix old and new trials.
+    recorded. ``is_whole`` says whether every trial that the criterion judges was run again, so that ``marks`` are those
+    of the exchange; otherwise they mix old and new trials.
     """
 
     marks: Decimal
@@ -161,7 +162,7 @@ class RerunEngine:
 
     def start_cause(self, budget: Budget = DEFAULT_BUDGET) -> None:
         """Begin with a full budget. Reruns that are known already cost nothing."""
-        self._budget, self._runs, self._cpu_seconds = budget, 0, 0.0
+        self._budget, self._runs, self._cpu_seconds, self._sleep_seconds = budget, 0, 0.0, 0.0
         self._dearest_seconds = self._dearest_judging_seconds = 0.0  # of one run, and of judging once
 
     @property
@@ -266,8 +267,9 @@ class RerunEngine:
         if known_recording is not None:
             return known_recording
         seconds_left = self._budget.cpu_seconds - self._cpu_seconds - self._dearest_judging_seconds
+        sleep_left = self._budget.sleep_seconds - self._sleep_seconds
         # A run that is as dear as the dearest so far must still fit.
-        if self._runs >= self._budget.runs or seconds_left <= _SAFETY * self._dearest_seconds:
+        if sleep_left <= 0 or self._runs >= self._budget.runs or seconds_left <= _SAFETY * self._dearest_seconds:
             raise BudgetSpent
         self._runs += 1
         # A changed line can make a loop endless, which must not use up the budget.
@@ -281,7 +283,7 @@ class RerunEngine:
             if meter.spent.cpu_seconds + time.process_time() - start > limit:
                 raise cut
 
-        meter = JobMeter(JobLimits(cpu_seconds=limit), check_budget)
+        meter = JobMeter(JobLimits(cpu_seconds=limit, sleep_seconds=sleep_left), check_budget)
         spec = build_trial_spec(self.trials[index], self._trial_plan)
         spec = apply_exchanges(replace(spec, records_lines=False), exchanges)
         try:
@@ -289,9 +291,10 @@ class RerunEngine:
         finally:
             seconds = meter.spent.cpu_seconds + time.process_time() - start
             self._cpu_seconds += seconds
+            self._sleep_seconds += meter.spent.sleep_seconds
             if not has_changed_line:
                 self._dearest_seconds = max(self._dearest_seconds, seconds)
-        if meter.spent.cpu_seconds >= limit:
+        if meter.spent.cpu_seconds >= limit or meter.spent.sleep_seconds >= sleep_left:
             # The limit may have ended the trial, so its recording proves nothing.
             raise cut
         self._recordings[index, keys] = recording

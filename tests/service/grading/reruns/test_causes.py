@@ -181,3 +181,15 @@ def test_parts_of_the_student() -> None:
     assert list_student_parts(find_assignment("relay-a-message")) == ("program", "responder", "second program")
     assert list_student_parts(find_assignment("parser-agent-and-logger")) == ("responder", "agent", "logger", "parser")
     assert list_student_parts(find_assignment("say-tm129")) == ("program",)
+
+
+def test_a_program_that_sleeps_uses_up_the_budget(runner: TrialRunner) -> None:
+    assignment, reference = read("echo-responder")
+    assert reference.program is not None
+    text = f"import select\nselect.select([], [], [], 1.5)\n{reference.program.text}"
+    submission = replace(reference, program=SourceFile("robot.py", text))
+    graded = grade(submission, assignment, runner=runner)
+    engine = RerunEngine(runner, plan_run(submission, assignment), graded, budget=Budget(sleep_seconds=0.3))
+    with pytest.raises(BudgetSpent):
+        engine.rerun((0,), ())
+    assert engine.spent.cpu_seconds < Budget().cpu_seconds
