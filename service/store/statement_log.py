@@ -16,7 +16,7 @@ from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session
 
 from service.statements.envelopes import Envelope
-from service.statements.keys import PublicKey, SigningKey, generate_signing_key
+from service.statements.keys import SigningKey, generate_signing_key, parse_public_key
 from service.statements.keys_document import KeyLine
 from service.statements.statement import (
     PAYLOAD_TYPE,
@@ -205,7 +205,7 @@ def find_key(session: Session, key_id: str) -> KeyLine:
 
 
 def _build_line(row: StatementKey) -> KeyLine:
-    return KeyLine(PublicKey(row.public_hex), row.created_at, row.retired_at, row.revoked_at)
+    return KeyLine(parse_public_key(row.public_hex), row.created_at, row.retired_at, row.revoked_at)
 
 
 def _select_current(what: Any) -> Select[Any]:

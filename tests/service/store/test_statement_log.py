@@ -375,6 +375,13 @@ def test_a_head_of_another_installation_is_refused(store: Store, published: Publ
         _check(store, head)
 
 
+def test_a_damaged_key_is_named(store: Store, published: Published) -> None:
+    with store.transaction() as session:
+        session.execute(update(StatementKey).values(public_hex="no digits"))
+    with pytest.raises(UsageError, match="the public key is 'no digits', expected 64 hexadecimal digits"):
+        statement_log.check_log(acting.service_on(store), acting.machine(), [])
+
+
 def test_a_new_key_signs_and_a_revoked_one_is_named(store: Store, published: Published) -> None:
     service, actor = acting.service_on(store), acting.machine()
     head = _write_head(store)
