@@ -1,31 +1,19 @@
-"""Flags of the notebook magics, and the simulator settings that result from them.
+"""Flags of the notebook magics: the words of a magic line, and the switches and values in them.
 
-Order, limits and side effects follow the original (robolab sections 1.2 and 8). ``notes`` explains flags whose effect
-may be unexpected.
+``simulator_page.py`` computes the simulator settings that result from them.
 """
 
 from __future__ import annotations
 
-import math
 import shlex
 from dataclasses import dataclass, field, replace
 
 from sim.errors import UsageError
-from sim.floors import OBSTACLE_PRESETS, get_floor_start, list_floor_names
-from sim.recording import Pose
-from sim.robot import WIDENED, get_default_robot_name
 from submissions.source_text import PREAMBLES, Preamble, find_magic_line
 from submissions.suggestions import suggest_name
 
-_MAX_X, _MAX_Y, _MAX_ANGLE = 2362, 1143, 360
-_MAX_LIGHT_NOISE, _MAX_MOTOR_NOISE = 128, 500
 #: The longest line of flags, in characters. Splitting it takes time.
 _MAX_ARGUMENTS_LENGTH = 2000
-_PEN_COLOURS = ("red", "orange", "green")
-
-#: Pose of the robot in a new simulator, and after a robot is chosen.
-_FRESH_POSE = Pose(200, 800, 0)
-_AFTER_ROBOT = Pose(200, 943, 0)
 
 _VALUED = {
     "b": "background",
@@ -84,21 +72,6 @@ class Flags:
     def remove_value(self, flag: str) -> Flags:
         """Return these flags without one value."""
         return replace(self, values={key: value for key, value in self.values.items() if key != flag})
-
-
-@dataclass(frozen=True, slots=True)
-class SimulatorSettings:
-    """Simulator settings after applying the flags of a magic line."""
-
-    background: str
-    robot: str
-    obstacles: tuple[tuple[float, float, float, float], ...]
-    pose: Pose
-    light_noise: float
-    motor_noise: float
-    pen_down: bool
-    collaborative: bool
-    notes: tuple[str, ...]
 
 
 def split_program(text: str) -> tuple[Flags, str]:
@@ -224,160 +197,3 @@ def _take_value(remaining_words: list[str], flag: str) -> str:
     if not remaining_words:
         raise UsageError(f"{flag} needs a value")
     return remaining_words.pop(0)
-
-
-def apply_flags(flags: Flags) -> SimulatorSettings:
-    """Return the settings of a new simulator with these flags.
-
-    Raises:
-        UsageError: A value is not a number.
-    """
-    return SimulatorPage().apply(flags)
-
-
-class SimulatorPage:
-    """Model of the original's page: sliders with limits, and moves that read all three sliders.
-
-    Settings persist until another flag changes them; switches apply to one magic. No program runs here.
-    """
-
-    def __init__(self) -> None:
-        self.background = "Empty_Map"
-        self.robot = self._chosen_robot = "Default_Robot"
-        self.obstacles: tuple[tuple[float, float, float, float], ...] = ()
-        self.pose = _FRESH_POSE
-        self._angle_slider = 0
-        self._noise = {"N": 0.0, "M": 0.0}
-        self._noise_is_heard = True
-        self._notes: list[str] = []
-
-    def apply(self, flags: Flags) -> SimulatorSettings:
-        """Apply the flags and return the resulting settings.
-
-        Raises:
-            UsageError: A value is not a number.
-        """
-        self._notes = []
-        values = flags.values
-        sliders = {flag: self._parse_slider(flag, values, most) for flag, most in _SLIDERS.items()}
-        if "r" in values:
-            self._choose_robot(values["r"])
-        if "b" in values:
-            self._choose_background(values["b"])
-        if "o" in values:
-            self._choose_obstacles(values["o"])
-        x, y, angle = sliders["x"], sliders["y"], sliders["a"]
-        if "m" in flags.switches or x is not None or y is not None or angle is not None:
-            self._move(x, y, angle)
-        self._choose_noise(sliders["N"], sliders["M"])
-        if "P" in values and values["P"] not in _PEN_COLOURS:
-            self._add_note(f"-P {values['P'][:40]} is not a pen colour; expected one of {', '.join(_PEN_COLOURS)}")
-        return SimulatorSettings(
-            self.background,
-            self.robot,
-            self.obstacles,
-            self.pose,
-            self._noise["N"],
-            self._noise["M"],
-            "p" in flags.switches,
-            "L" in flags.switches,
-            tuple(self._notes),
-        )
-
-    def set_pose(self, pose: Pose) -> None:
-        """Set the robot's pose after a run."""
-        self.pose = pose
-
-    def _choose_robot(self, name: str) -> None:
-        if name not in WIDENED:
-            hint = suggest_name(name[:40], WIDENED)
-            self._add_note(f"-r {name[:40]} is not a robot; Default_Robot is used, as in the simulator{hint}")
-            name = "Default_Robot"
-        self.robot = self._chosen_robot = name
-        self.pose = _AFTER_ROBOT
-        self._noise = {"N": 0.0, "M": 0.0}
-        self._noise_is_heard = True
-
-    def _choose_background(self, name: str) -> None:
-        if name not in list_floor_names():
-            hint = suggest_name(name[:40], list_floor_names())
-            self._add_note(f"-b {name[:40]} is not a background; Empty_Map is used, as in the simulator{hint}")
-            name = "Empty_Map"
-        self.background = name
-        self.pose, self.obstacles = get_floor_start(name)
-        if 0 <= self.pose.heading <= _MAX_ANGLE:
-            self._angle_slider = round(self.pose.heading)
-        # The original keeps this change of the robot for the rest of the session; here it ends with the background.
-        self.robot = self._chosen_robot
-        if get_default_robot_name(name) == WIDENED["Default_Robot"]:
-            self._add_note("-b Radial_grey also sets the light sensors 60 mm to either side, as in the simulator")
-            self.robot = WIDENED[self._chosen_robot]
-            self._noise = {"N": 0.0, "M": 0.0}
-            self._noise_is_heard = False
-
-    def _choose_obstacles(self, name: str) -> None:
-        if name in OBSTACLE_PRESETS and name != "None":
-            self.obstacles = OBSTACLE_PRESETS[name]
-        elif name != "None":
-            hint = suggest_name(name[:40], OBSTACLE_PRESETS)
-            self._add_note(
-                f"-o {name[:40]} is not a set of obstacles; they stay as they are, as in the simulator{hint}"
-            )
-        elif self.obstacles:
-            self._add_note(
-                "-o None leaves the obstacles as they are, as in the simulator; choosing a background clears them"
-            )
-
-    def _choose_noise(self, light: int | None, motor: int | None) -> None:
-        if (light or motor) and not self._noise_is_heard:
-            self._add_note(
-                "-N and -M do nothing after -b Radial_grey until a robot is chosen (-r), as in the simulator"
-            )
-        if light is not None:
-            self._noise["N"] = light if self._noise_is_heard else 0.0
-            old_pose = self.pose
-            self._move(None, None, None)
-            if old_pose.heading != self.pose.heading:
-                self._add_note(f"-N also turns the robot to {self.pose.heading:g} degrees, as in the simulator")
-        if motor is not None:
-            self._noise["M"] = motor if self._noise_is_heard else 0.0
-
-    def _parse_slider(self, flag: str, values: dict[str, str], maximum: int) -> int | None:
-        """Return a whole number, clamped to the slider's range."""
-        if flag not in values:
-            return None
-        try:
-            number = int(values[flag])
-        except ValueError:
-            raise UsageError(f"-{flag} {values[flag][:40]}: expected a whole number between 0 and {maximum}") from None
-        value = min(max(number, 0), maximum)
-        if value != number:
-            self._add_note(
-                f"-{flag} {values[flag][:40]} becomes {value}: the simulator's slider goes from 0 to {maximum}"
-            )
-        return value
-
-    def _move(self, x: int | None, y: int | None, angle: int | None) -> None:
-        """Move the robot to the values of all three sliders.
-
-        The x and y sliders follow the robot; the angle slider does not.
-        """
-        if angle is not None:
-            self._angle_slider = angle
-        x = _to_slider_value(self.pose.x, _MAX_X) if x is None else x
-        y = _to_slider_value(self.pose.y, _MAX_Y) if y is None else y
-        if angle is None and self.pose.heading != self._angle_slider:
-            self._add_note(f"setting the position turns the robot to {self._angle_slider} degrees; add -a to choose")
-        self.pose = Pose(x, y, self._angle_slider)
-
-    def _add_note(self, text: str) -> None:
-        if text not in self._notes:
-            self._notes.append(text)
-
-
-_SLIDERS = {"x": _MAX_X, "y": _MAX_Y, "a": _MAX_ANGLE, "N": _MAX_LIGHT_NOISE, "M": _MAX_MOTOR_NOISE}
-
-
-def _to_slider_value(value: float, maximum: int) -> int:
-    """Return the slider value for a coordinate. JavaScript rounds halves up."""
-    return min(max(math.floor(value + 0.5), 0), maximum)

@@ -19,8 +19,9 @@ from sim.random_streams import RandomStream
 from sim.recording import TICK, Recording
 from sim.robot import get_robot
 from sim.world import Noise
-from submissions.magics import Flags, SimulatorPage, SimulatorSettings, parse_flags
+from submissions.magics import Flags, parse_flags
 from submissions.marked_run import RunSite
+from submissions.simulator_page import FRESH_PAGE, PageState, SimulatorPage, SimulatorSettings
 from submissions.source_text import find_modules
 
 #: The program that ``%sim_magic --refresh`` loads.
@@ -42,6 +43,17 @@ MarkedRunPlanner = Callable[[LoadedProgram, Flags, SimulatorSettings], PlannedRu
 
 
 @dataclass(frozen=True, slots=True)
+class NotebookPage:
+    """The simulator between two magics: the state of its page, and the loaded robot program."""
+
+    state: PageState = FRESH_PAGE
+    program: LoadedProgram | None = None
+
+
+NEW_NOTEBOOK_PAGE = NotebookPage()
+
+
+@dataclass(frozen=True, slots=True)
 class UnmarkedRuns:
     """Settings of unmarked runs, which keep their own flags. Each run draws its own chance from ``seed``."""
 
@@ -58,19 +70,37 @@ class NotebookRuns:
     """Follows the magics of one notebook execution, in call order."""
 
     def __init__(
-        self, site: RunSite | None, marked_run: MarkedRunPlanner, unmarked_runs: UnmarkedRuns, last_run: PlannedRun
+        self,
+        site: RunSite | None,
+        marked_run: MarkedRunPlanner,
+        unmarked_runs: UnmarkedRuns,
+        last_run: PlannedRun,
+        page: NotebookPage = NEW_NOTEBOOK_PAGE,
     ) -> None:
-        """Create the planner. ``site`` is where the marked run starts, ``last_run`` the run after all cells, if any."""
+        """Create the planner.
+
+        Args:
+            site: Where the marked run starts, if any.
+            marked_run: Plans the marked run.
+            unmarked_runs: The settings of the other runs.
+            last_run: The run after all cells, if any.
+            page: The simulator before the first magic.
+        """
         self._marked = site
         self._marked_run = marked_run
         self._unmarked = unmarked_runs
         self._last = last_run
-        self.simulator = SimulatorPage()
-        self._program: LoadedProgram | None = None
+        self.simulator = SimulatorPage(page.state)
+        self._program = page.program
         self._count = 0
         self.marked_ran = False
         #: Sites of the runs, in order.
         self.started: list[RunSite] = []
+
+    @property
+    def page(self) -> NotebookPage:
+        """The simulator after the magics so far."""
+        return NotebookPage(self.simulator.state, self._program)
 
     def plan_standstill(self) -> PlannedRun:
         """The run of a robot that does not move, at its current pose."""

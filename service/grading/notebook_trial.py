@@ -18,8 +18,9 @@ from service.grading.trial_runner import TrialRunner
 from sim.motion import Rectangle
 from sim.recording import Fault, Recording, Verdict
 from sim.sentences import Sentence, join_sentences
-from submissions.magics import Flags, SimulatorSettings
+from submissions.magics import Flags
 from submissions.marked_run import RunChoice, RunSite
+from submissions.simulator_page import SimulatorSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from sim.errors import UsageError
 from sim.sentences import Sentence
 from submissions.assignment.definition import Assignment
 from submissions.criteria.code import SourceRules
-from submissions.magics import Flags, apply_flags, comment_out_magic, split_program
+from submissions.magics import Flags, comment_out_magic, split_program
+from submissions.simulator_page import apply_flags
 from submissions.source_text import find_modules
 from submissions.submission import Part, Submission
 

@@ -26,9 +26,10 @@ from sim.recording import TICK, Recording
 from sim.robot import get_robot
 from sim.world import Noise
 from submissions.assignment.limits import DEFAULT_LIMITS
-from submissions.magics import Flags, SimulatorSettings, apply_flags, split_program
+from submissions.magics import Flags, split_program
 from submissions.marked_run import find_runs
 from submissions.notebook import LoadedNotebook, is_script, read_notebook, read_script
+from submissions.simulator_page import SimulatorSettings, apply_flags
 from submissions.source_text import decode_source, find_modules
 from submissions.submission import Notebook
 

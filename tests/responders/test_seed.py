@@ -38,8 +38,9 @@ from sim.recording import LossReason, Pose, Recording, Verdict
 from submissions.assignment.examples import locate_examples
 from submissions.diagram import Diagram
 from submissions.diagram_cells import read_diagrams
-from submissions.magics import apply_flags, split_program
+from submissions.magics import split_program
 from submissions.notebook import read_notebook
+from submissions.simulator_page import apply_flags
 
 NETWORK = {"mlp_shapes_14x14.joblib": load_weights("shapes")}
 SHAPES = (

@@ -8,14 +8,12 @@ from sim.errors import UsageError
 from sim.recording import Pose
 from submissions.magics import (
     Flags,
-    SimulatorPage,
-    SimulatorSettings,
-    apply_flags,
     comment_out_magic,
     parse_flags,
     parse_magic,
     split_program,
 )
+from submissions.simulator_page import SimulatorPage, SimulatorSettings, apply_flags
 
 pytestmark = pytest.mark.fast
 
