@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Protocol
 
 from responders import message_format, packets, wire
 from responders.conversation import Answer, Conversation
 from responders.faults import build_error_fault, build_stop_fault, describe_refusal, to_child_data_error
 from responders.link import build_link
-from responders.responder_process import LoggedData, ResponderProcess
+from responders.responder_process import LoggedData
 from responders.sandbox.meter import OBJECT_BYTES, ChildStopped, JobMeter
 from responders.sandbox.served_child import ServedChild
 from responders.trial_spec import TrialSpec
@@ -44,6 +44,13 @@ class _TrialEnded(Exception):
         self.fault = fault
 
 
+class AnsweringResponder(Protocol):
+    """A responder, as the bridge sees it: a process, or somebody outside."""
+
+    def answer(self, text: str, t: int, message: int, logged_data: LoggedData) -> Answer:
+        """Return the answer to a text that arrived at ``t``, with what the robot has logged since the last text."""
+
+
 class Bridge:
     """Serves one robot program from its first frame to its last. Its list attributes then hold the recorded events."""
 
@@ -53,7 +60,7 @@ class Bridge:
         arena: Arena,
         camera: LightCamera,
         child: ServedChild,
-        responder: ResponderProcess | None,
+        responder: AnsweringResponder | None,
         meter: JobMeter,
     ) -> None:
         self._spec = spec

@@ -11,6 +11,13 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from responders import message_format, wire
+from responders.answer_texts import (
+    JSON_HINT,
+    RETURN_HINT,
+    build_length_fault,
+    build_protocol_fault,
+    build_text_answer,
+)
 from responders.conversation import Answer
 from responders.faults import (
     build_error_fault,
@@ -24,13 +31,11 @@ from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.served_child import ServedChild
 from responders.trial_spec import EarlierAnswer, ResponderSpec
 from sim.random_streams import RandomStream
-from sim.recording import SECOND, AgentMessage, Call, Fault, Verdict
+from sim.recording import AgentMessage, Call, Fault, Verdict
 
 _MAX_NOTES = 200
 #: Maximum number of recorded calls, and of characters in each of their parts.
 _MAX_CALLS, _MAX_RECORDED_LENGTH = 10_000, 200
-_RETURN_HINT = "A function returns nothing where it comes to its end, or to a bare return: return the answer."
-_JSON_HINT = 'For an object return "JSON::" + json.dumps(the object).'
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,32 +191,24 @@ class ResponderProcess:
         """Return the answer in a frame. A valid ``JSON::`` text also has an entry for the robot's queue."""
         text = frame["error"]["text"] if frame["kind"] == "error" else frame.get("text", "")
         self._charge_output(text, "printed and answered")
-        hint = ""
         match frame["kind"]:
-            case "text" if not text.startswith(message_format.JSON):
-                return Answer(text, self._slept)
             case "text":
-                try:
-                    entry = message_format.format_queue_entry(text)
-                except ValueError as error:
-                    sentence = f"the responder's answer begins with JSON:: but is not JSON: {error}"
-                    return Answer(
-                        text, self._slept, self._build_protocol_fault(t, sentence, _JSON_HINT), note="malformed"
-                    )
-                self._meter.charge_bytes(len(entry))
-                return Answer(text, self._slept, entry=entry)
+                return build_text_answer(text, t, self._slept, self._meter, self._agent)
             case "error":
                 return Answer(fault=build_error_fault(frame["error"], t + self._slept, "responder"))
             case "long":
-                description = f"an answer of {frame['length']} characters; the most is about 60000"
-            case _:
-                description = f"{frame['type'][:_MAX_RECORDED_LENGTH]} instead of a text; an answer has to be a str"
-                hint = _RETURN_HINT if frame["type"] == "NoneType" else _JSON_HINT
+                return Answer(fault=build_length_fault(frame["length"], t + self._slept, self._agent))
+        description = f"{frame['type'][:_MAX_RECORDED_LENGTH]} instead of a text; an answer has to be a str"
+        hint = RETURN_HINT if frame["type"] == "NoneType" else JSON_HINT
         return Answer(fault=self._build_protocol_fault(t, describe_wrong_return(description), hint))
 
+    @property
+    def _agent(self) -> str:
+        """Return the name of the agent in faults; empty for the responder itself."""
+        return "" if self._who == "responder" else self._who
+
     def _build_protocol_fault(self, t: int, sentence: str, hint: str = "") -> Fault:
-        agent = "" if self._who == "responder" else self._who
-        return Fault((t + self._slept) / SECOND, Verdict.PROTOCOL_ERROR, "responder", sentence, hint=hint, agent=agent)
+        return build_protocol_fault(t + self._slept, sentence, hint, self._agent)
 
     def _receive_until(self, final_kind: str) -> wire.Frame:
         assert self._child is not None

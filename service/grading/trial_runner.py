@@ -12,9 +12,11 @@ from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import TypeVar
 
+from responders.answered_trial import AnsweredRun, run_answered_trial
 from responders.function_calls import CallResults, FunctionCall, call_functions
 from responders.notebook_executor import ExecutedNotebook, RunPlanner, build_unstarted_recording, execute_notebook
 from responders.notebook_process import NotebookSpec
+from responders.outside_responder import OutsideAnswerer, RememberedAnswers
 from responders.pair import run_pair
 from responders.repeated_faults import FaultReplay
 from responders.sandbox.child_exit import KilledFromOutside
@@ -87,6 +89,20 @@ class TrialRunner:
             return self.run_with_retries(lambda: run_pair(spec, partner, arenas, camera, self._sandboxes, meter), meter)
         ground = self._prepare_arena_and_camera(spec, obstacles)
         return self.run_with_retries(lambda: run_trial(spec, *ground, self._sandboxes, meter), meter)
+
+    def run_answered(
+        self,
+        spec: TrialSpec,
+        obstacles: tuple[Rectangle, ...],
+        ask: OutsideAnswerer,
+        meter: JobMeter,
+    ) -> AnsweredRun:
+        """Run one trial with one robot, whose texts ``ask`` answers. Raises the same errors as ``run``.
+
+        Also raises whatever ``ask`` raises, except ``Unanswered``.
+        """
+        ground, answers = self._prepare_arena_and_camera(spec, obstacles), RememberedAnswers(ask)
+        return self.run_with_retries(lambda: run_answered_trial(spec, *ground, self._sandboxes, meter, answers), meter)
 
     def execute_notebook(
         self, spec: NotebookSpec, planner: RunPlanner, meter: JobMeter | None = None
