@@ -123,6 +123,9 @@ class Submitted:
 class Engine(Protocol):
     """Runs robots and checks notebooks. Every method may raise ``EngineError``."""
 
+    #: The seed of everything random in the runs, a whole number from 0; 0 at first.
+    seed: int
+
     def call_magic(self, call: MagicCall, page: Page | None, answer: Answerer) -> MagicResult:
         """Apply a magic's flags to the page (None: a new page), and run the robot if it starts one."""
 
