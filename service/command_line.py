@@ -143,7 +143,7 @@ def _build_group_arguments() -> dict[str, Any]:
 def _add_commands(app: typer.Typer, commands: Mapping[str, Command | CommandGroup]) -> None:
     for name, entry in commands.items():
         if isinstance(entry, Command):
-            app.command(name, short_help=entry.summary)(_do_nothing)
+            app.command(name, short_help=entry.summary, hidden=entry.hidden)(_do_nothing)
         else:
             group = typer.Typer(help=entry.summary, **_build_group_arguments())
             group.callback()(_do_nothing)

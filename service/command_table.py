@@ -14,12 +14,13 @@ from types import MappingProxyType
 class Command:
     """A command at ``module:name`` below ``service.commands``.
 
-    ``serves`` marks those that run until stopped and log.
+    ``serves`` marks those that run until stopped and log, ``hidden`` those that programs start.
     """
 
     entry_point: str
     summary: str
     serves: bool = False
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,5 +185,8 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
             {"check": Command("sandbox:check", "Test the sandbox and list its active layers.")},
         ),
         "demo": Command("demo:demo", "Grade sample submissions through a real worker."),
+        "notebook-engine": Command(
+            "notebook_engine:notebook_engine", "Run robots and checks for a notebook.", serves=True, hidden=True
+        ),
     }
 )
