@@ -37,6 +37,7 @@ from service.grading.trial_runner import TrialRunner
 from service.grading.verdict_labels import VERDICT_LABELS
 from service.home import user_permissions
 from service.reports.display_text import to_display_text
+from service.reports.messages import iterate_robots
 from service.reports.output_files import prepare_folder, write_file, write_film, write_replay
 from service.reports.plots.diagram_drawing import draw_diagram
 from service.reports.plots.diagram_parts import Highlights
@@ -45,7 +46,6 @@ from service.reports.plots.path import draw_path
 from service.reports.plots.png import render_png
 from service.reports.replay.document import Pixels, build_run_replay
 from service.reports.replay.sources import Sources, collect_cell_sources, collect_file_sources
-from service.reports.robots import iterate_robots
 from service.reports.trace import build_trace, replace_surrogates
 from service.reports.transcript import build_transcript
 from service.reports.view import NO_OVERLAY, OverlayTrials

@@ -17,6 +17,7 @@ from PIL import Image, ImageColor, ImageDraw
 
 from service.grading.grade import TrialResult
 from service.reports.film_captions import Caption, draw_caption_strip
+from service.reports.messages import iterate_robots
 from service.reports.plots.style import (
     FAINT,
     FAULT,
@@ -27,7 +28,6 @@ from service.reports.plots.style import (
     RULE,
     SECOND_ROBOT,
 )
-from service.reports.robots import iterate_robots
 from sim.recording import Pose, Recording
 from sim.recording_values import count_ticks_until, get_pose_after, get_recorded_robot, rebuild_floor
 from sim.robot import LightSensor

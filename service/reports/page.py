@@ -28,7 +28,7 @@ from service.reports.display_text import (
     to_one_line,
 )
 from service.reports.faults import FaultGroup, group_faults
-from service.reports.message_losses import describe_loss_fully, describe_note
+from service.reports.messages import collect_messages, describe_loss_fully, describe_note, format_party_name
 from service.reports.plots.grade_plots import group_same_answers, list_plots
 from service.reports.plots.message_counts import count_messages, describe_message_counts
 from service.reports.plots.own_diagrams import OwnDiagram, list_own_diagrams
@@ -36,7 +36,6 @@ from service.reports.plots.plot import Plot
 from service.reports.plots.sequence import MAX_CALL_STEPS, Step, iterate_inner_steps
 from service.reports.recognition_table import ClassLine, RecognitionTable, build_recognition_table
 from service.reports.replay.trial import compute_loss_time, format_moment_link
-from service.reports.robots import collect_messages, format_party_name
 from service.reports.timeline import TimelineEntry, build_timeline
 from service.reports.verdict_sentences import (
     VerdictWords,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_display_text
-from service.reports.robots import format_party_name, iterate_robots
+from service.reports.messages import format_party_name, iterate_robots
 from service.reports.verdict_sentences import EVENT_KINDS
 from sim.recording import Fault, Recording, Verdict
 from sim.recording_values import collect_printed_lines

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from service.reports.message_losses import describe_loss_fully
-from service.reports.robots import SIMULATOR, iterate_robots, select_answering_party
+from service.reports.messages import SIMULATOR, describe_loss_fully, iterate_robots, select_answering_party
 from sim.recording import Recording
 from sim.recording_values import collect_printed_lines
 

@@ -12,8 +12,8 @@ from types import MappingProxyType
 
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_one_line
+from service.reports.messages import format_party_name
 from service.reports.plots.message_counts import MessageCount, identify_party
-from service.reports.robots import format_party_name
 from submissions.diagram import Diagram, DiagramActor
 
 Pair = tuple[str, str]

@@ -13,8 +13,8 @@ from typing import Literal
 
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_one_line
+from service.reports.messages import PARTNER_OF, SECOND, format_party_name, iterate_robots
 from service.reports.plots.sequence import PARTIES, SequenceDiagram, Step
-from service.reports.robots import PARTNER_OF, SECOND, format_party_name, iterate_robots
 from sim.recording import Call, Recording
 from submissions.diagram import Diagram, DiagramActor, DiagramArrow, Divider
 

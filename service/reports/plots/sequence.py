@@ -12,8 +12,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from service.reports.display_text import abbreviate_message, to_one_line
-from service.reports.message_losses import describe_loss, describe_reach
-from service.reports.robots import PARTNER_OF, SECOND, iterate_robots
+from service.reports.messages import PARTNER_OF, SECOND, describe_loss, describe_reach, iterate_robots
 from sim.recording import Call, Message, Recording
 
 #: In the order of their lanes. A name bound to a network, such as MLP, belongs to the party ``network``.

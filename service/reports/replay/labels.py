@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from service.language import Language, translatable
-from service.reports.robots import PARTY_NAMES
+from service.reports.messages import PARTY_NAMES
 from service.reports.verdict_sentences import EVENT_KINDS
 
 #: By the script's keys.

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from service.grading.grade import TrialResult
 from service.language import Language
 from service.reports.display_text import to_one_line
+from service.reports.messages import iterate_robots
 from service.reports.replay.sources import Sources
 from service.reports.replay.trial import trial_to_json
-from service.reports.robots import iterate_robots
 from sim.recording import SECOND, Recording
 
 #: Larger differences of poses are visible.

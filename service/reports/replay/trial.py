@@ -19,9 +19,14 @@ from service.grading.grade import CriterionResult, Prediction, TrialResult
 from service.language import ENGLISH, Language
 from service.reports.display_text import abbreviate_message, format_decimal, to_display_text, to_one_line
 from service.reports.faults import describe_place
-from service.reports.message_losses import describe_loss_fully, describe_note
+from service.reports.messages import (
+    PARTNER_OF,
+    describe_loss_fully,
+    describe_note,
+    iterate_robots,
+    select_answering_party,
+)
 from service.reports.replay.sources import Place, Sources
-from service.reports.robots import PARTNER_OF, iterate_robots, select_answering_party
 from service.reports.verdict_sentences import describe_verdict, format_trial_name
 from sim.recording import COLUMNS, SECOND, AgentMessage, Image, Message, Pose, Recording, Ticks, Verdict
 from sim.recording_values import collect_printed_lines, get_pose_at, get_recorded_robot
