@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any, NoReturn, Protocol
 
 from responders import message_format, packets, wire
+from responders.channel import build_link
 from responders.conversation import Answer, Conversation
 from responders.faults import build_error_fault, build_stop_fault, describe_refusal, to_child_data_error
-from responders.link import build_link
 from responders.responder_process import LoggedData
 from responders.sandbox.meter import OBJECT_BYTES, ChildStopped, JobMeter
 from responders.sandbox.served_child import ServedChild
@@ -22,9 +22,8 @@ from responders.trial_world import build_world, format_reading
 from sim.arena import Arena
 from sim.camera import LightCamera
 from sim.drive import Wheel
-from sim.line_trace import LINE_BYTES, LineTrace
 from sim.random_streams import RandomStream
-from sim.recording import MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, TimedText, Verdict
+from sim.recording import LINE_BYTES, MILLISECOND, SECOND, STAND_IN_PREFIX, Fault, Image, LineTrace, TimedText, Verdict
 from sim.world import HashChain
 
 _READ_TIME = 10 * MILLISECOND

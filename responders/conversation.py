@@ -8,8 +8,7 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass, replace
 
-from responders.channel import Channel, TrialChannel
-from responders.link import ChannelLink, Contact
+from responders.channel import Channel, ChannelLink, Contact, TrialChannel
 from responders.message_format import format_queue_entry
 from sim.recording import SECOND, Fault, Message
 from sim.world import HashChain

@@ -12,8 +12,8 @@ from greenlet import getcurrent, greenlet
 
 from responders import message_format
 from responders.bridge import Bridge
+from responders.channel import InfraredLink
 from responders.conversation import SentText
-from responders.link import InfraredLink
 from responders.responder_process import LoggedData, ResponderProcess
 from responders.sandbox.meter import JobMeter
 from responders.sandbox.served_child import ServedChild

@@ -22,11 +22,11 @@ from service.reports.view import build_student_view
 from sim.recording import Verdict
 from sim.recording_values import collect_faults
 from submissions.assignment.definition import Assignment
+from submissions.assignment.scenario import NO_SWEEP
 from submissions.criteria.code import SourceRules
 from submissions.part_notes import build_missing_part_note
 from submissions.seeds import PUBLIC_SECRET
 from submissions.submission import PART_FILES, Submission
-from submissions.sweep import NO_SWEEP
 
 #: Simulated seconds; less if the assignment's own limit is shorter.
 MAX_SECONDS = 30.0

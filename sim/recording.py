@@ -6,17 +6,19 @@ ticks can import this module without numpy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, overload
 
 from sim.columns import Panel, collect_columns, column
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
 
 Floats: TypeAlias = "NDArray[np.float64]"
 Integers: TypeAlias = "NDArray[np.int64]"
@@ -29,6 +31,8 @@ BROWSER_TICK = SECOND // 1000 * 33
 MILLISECOND = SECOND // 1000
 #: Pixels that a light sensor of 20 mm sees (robolab: rows and columns with (r-10)**2 + (c-10)**2 < 100).
 SENSOR_SIDE = 20
+#: Memory of one line in a trace: a float and two integers.
+LINE_BYTES = 16
 
 
 class Verdict(StrEnum):
@@ -169,6 +173,39 @@ class ProgramLine(NamedTuple):
     t: float
     line: int
     outer: int
+
+
+class LineTrace(Sequence[ProgramLine]):
+    """The lines of a program in the order in which it came to them, in little memory."""
+
+    __slots__ = ("_lines", "_outer", "_times")
+
+    def __init__(self) -> None:
+        self._times = array("d")
+        self._lines, self._outer = array("i"), array("i")
+
+    def append(self, t: float, line: int, outer: int) -> None:
+        """Add a line. The arguments are those of ``ProgramLine``."""
+        self._times.append(t)
+        self._lines.append(line)
+        self._outer.append(outer)
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def __iter__(self) -> Iterator[ProgramLine]:
+        return map(ProgramLine, self._times, self._lines, self._outer)
+
+    @overload
+    def __getitem__(self, index: int) -> ProgramLine: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[ProgramLine, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> ProgramLine | tuple[ProgramLine, ...]:
+        if isinstance(index, slice):
+            return tuple(map(ProgramLine, self._times[index], self._lines[index], self._outer[index]))
+        return ProgramLine(self._times[index], self._lines[index], self._outer[index])
 
 
 #: Prefix of the simulator's answers when there is no responder; the text itself follows.

@@ -16,20 +16,23 @@ import signal
 import socket
 import struct
 import subprocess
-from collections.abc import Set
+import sys
+from collections.abc import Sequence, Set
 from pathlib import Path
 from typing import Any, Literal
 
 from responders import wire
-from responders.sandbox import bubblewrap, zygote_command
+from responders.sandbox import bubblewrap
 from responders.sandbox.child_exit import KilledFromOutside
 from responders.sandbox.control_group import ControlGroup
 from responders.sandbox.isolation import Isolation, build_missing_error, describe_layers
 from responders.sandbox.meter import ChildStopped, JobMeter
 from responders.sandbox.private_folders import PrivateFolders
+from responders.sandbox.processor import ALLOWED
 from responders.sandbox.roles import WITH_LIBRARIES, ChildRole, compile_bytecode, find_module_folder
 from responders.sandbox.running_child import Child, ChildLimits
 from sim.errors import HostError
+from sim.processes import build_arithmetic_environment, build_python_command
 
 ChildWork = Literal["role", "battery"]
 
@@ -42,6 +45,24 @@ _MAX_PROCESSORS = 1024
 #: Report of an ended child: wait status, and user and system time as seconds and microseconds.
 _EXIT_REPORT = struct.Struct("=i4x4q")
 _BATTERY_LIMITS = ChildLimits(2.0, 64 << 20)
+#: Start of a command with fixed memory addresses, because objects are hashed by address. The setting is inherited, so
+#: it is made in a separate process, not in the worker. An exec that restores root's capabilities resets it;
+#: bubblewrap's root process keeps the right to give them up (SECBIT_NOROOT) only for this.
+_FIXED_ADDRESS_COMMAND = (
+    sys.executable,
+    *("-I", "-S", "-c"),
+    "import ctypes, os, sys; libc = ctypes.CDLL(None); PR_SET_SECUREBITS, NOROOT_LOCKED, PR_CAP_AMBIENT, IS_SET, "
+    "LOWER, CAP_SETPCAP = 28, 3, 47, 1, 3, 8; in_bubblewrap = libc.prctl(PR_CAP_AMBIENT, IS_SET, CAP_SETPCAP, 0, 0) "
+    "== 1; in_bubblewrap and libc.prctl(PR_SET_SECUREBITS, NOROOT_LOCKED, 0, 0, 0); in_bubblewrap and "
+    "libc.prctl(PR_CAP_AMBIENT, LOWER, CAP_SETPCAP, 0, 0); libc.personality(0x40000); os.execv(sys.argv[1], "
+    "sys.argv[1:])",
+)
+_START_CODE = (
+    f"import os, sys; os.sched_setaffinity(0, {sorted(ALLOWED)}); "
+    "high = [os.dup2(int(fd), 100 + place) for place, fd in enumerate(sys.argv[1:3])]; "
+    "os.dup2(high[0], 3); os.dup2(high[1], 4); os.closerange(5, 1 << 16); sys.path.insert(0, sys.argv[3]); "
+    "from inside.zygote import main; main(sys.argv[4], sys.argv[5], sys.argv[6].split(), sys.argv[7:])"
+)
 
 
 class _ZygoteEnded(KilledFromOutside):
@@ -277,12 +298,12 @@ class Zygote:
         ]
         try:
             self._process = subprocess.Popen(
-                [*group_prefix, *wrapping, *zygote_command.build_command(descriptors, arguments)],
+                [*group_prefix, *wrapping, *_build_command(descriptors, arguments)],
                 pass_fds=descriptors,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 cwd="/",
-                env=zygote_command.build_environment(),
+                env=_build_environment(),
             )
         finally:
             for each in zygote_ends:
@@ -344,3 +365,32 @@ def _check_signal(pidfd: int) -> None:
         signal.pidfd_send_signal(pidfd, 0)
     except OSError as error:
         raise build_missing_error(f"pidfd_send_signal: {error.strerror}") from None
+
+
+def _build_command(sockets: Sequence[int], arguments: Sequence[str]) -> list[str]:
+    """Return the command of a zygote with these two socket descriptors.
+
+    ``arguments`` are its code folder, its role, the parent of private folders, the excluded modules and the import
+    folders of its children.
+    """
+    # Of constant length, because a command's length affects addresses.
+    padded_numbers = [f"{number:05}" for number in sockets]
+    # -I would ignore the hash seed.
+    return [*_FIXED_ADDRESS_COMMAND, *build_python_command("-B", "-c", _START_CODE, *padded_numbers, *arguments)]
+
+
+def _build_environment() -> dict[str, str]:
+    """Return the environment of a zygote, without anything of the worker's. It is the same for all zygotes.
+
+    It fixes hash seeds and numeric kernels, so that their children behave identically.
+    """
+    return {
+        "PATH": "/usr/bin:/bin",
+        "LANG": "C.UTF-8",
+        "MKL_NUM_THREADS": "1",
+        "MALLOC_ARENA_MAX": "2",
+        "LOKY_MAX_CPU_COUNT": "1",
+        "JOBLIB_MULTIPROCESSING": "0",
+        "ORT_DISABLE_TELEMETRY": "1",
+        **build_arithmetic_environment(),
+    }

@@ -81,7 +81,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyCurve:
-    """The accuracy along one swept condition (a key of ``submissions.sweep.CONDITIONS``), in ascending order."""
+    """The accuracy along one swept condition (a key of ``CONDITIONS``), in ascending order."""
 
     along: str
     levels: tuple[Level, ...]

@@ -36,6 +36,7 @@ from submissions.assignment.other_parts import SAME, build_second_poses, check_r
 from submissions.assignment.pools import read_draw
 from submissions.assignment.problems import Path as Place
 from submissions.assignment.problems import Problems, check_table, check_unique_id, filter_texts, read_tables
+from submissions.assignment.scenario import Sweep
 from submissions.assignment.schema import (
     HeadTable,
     LimitsTable,
@@ -48,7 +49,6 @@ from submissions.assignment.schema import (
 from submissions.criteria.common import AssignmentContext
 from submissions.source_text import decode_source
 from submissions.suggestions import join_with_or, suggest_name
-from submissions.sweep import Sweep
 
 _HEAD = tuple(HeadTable.model_fields)
 _TABLES = ("world", "parts", "agents", "limits", "training", "reruns", "scenario", "criterion")

@@ -16,11 +16,11 @@ from responders.channel import Channel
 from sim.random_streams import RandomStream
 from sim.recording import Pose
 from submissions.assignment.limits import DEFAULT_LIMITS, Limits
+from submissions.assignment.scenario import Coordinates
 from submissions.assignment.scenario import Scenario as Scenario
 from submissions.assignment.scenario import Visibility as Visibility
 from submissions.criteria import AnyCriterion
 from submissions.seeds import PUBLIC_SECRET, SeedSource, SeedTable, build_seed_table
-from submissions.sweep import Coordinates
 
 
 @dataclass(frozen=True, slots=True)

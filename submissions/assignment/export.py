@@ -15,8 +15,7 @@ from pathlib import Path
 
 from sim.errors import UsageError
 from submissions.assignment.folder import FILE_NAME, locate_assignment_folder
-from submissions.assignment.folder_files import walk_files
-from submissions.assignment.reader import NON_GRADING_FILES, read_assignment
+from submissions.assignment.reader import NON_GRADING_FILES, read_assignment, walk_files
 from submissions.assignment.task_sheet import TaskSheet, build_task_sheet
 
 _ID_LINE = re.compile(r'^id = "[^"]*"', re.MULTILINE)

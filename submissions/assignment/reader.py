@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,7 +17,6 @@ from sim.readers.toml_text import TOMLDecodeError, read_toml
 from submissions.assignment.assignment_parts import build_assignment
 from submissions.assignment.definition import Assignment
 from submissions.assignment.folder import FILE_NAME, list_catalogue_ids, locate_assignment_folder
-from submissions.assignment.folder_files import walk_files
 from submissions.assignment.problems import AssignmentProblems, Problems, find_lines
 from submissions.suggestions import suggest_name
 
@@ -135,3 +134,22 @@ def _read_folder_files(folder: Path) -> Mapping[str, bytes]:
                 (f"{path}: cannot be read ({error.strerror}), expected a readable file",)
             ) from None
     return MappingProxyType(files)
+
+
+def walk_files(folder: Path) -> Iterator[tuple[tuple[str, ...], Path]]:
+    """Yield the parts of the name and the path of each file in an assignment's folder, sorted.
+
+    Dot files and Python's caches are omitted.
+
+    Raises:
+        AssignmentProblems: A link leads out of the folder. Its author could read files of whoever uses the assignment.
+    """
+    root = folder.resolve()
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        if any(part.startswith(".") or part == "__pycache__" for part in parts):
+            continue
+        if path.is_symlink() and not path.resolve().is_relative_to(root):
+            raise AssignmentProblems((f"{path}: is a link that leads out of the folder, expected the file itself",))
+        if path.is_file():
+            yield parts, path

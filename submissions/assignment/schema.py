@@ -22,10 +22,10 @@ from sim.floors import HEIGHT, OBSTACLE_PRESETS, WIDTH
 from sim.motion import Rectangle
 from sim.robot import ROBOTS
 from submissions.assignment.limits import DEFAULT_LIMITS
+from submissions.assignment.scenario import CONDITIONS
 from submissions.assignment.table_problems import NUMBER_TAG, TABLE_TAG, format_short
 from submissions.strict_table import Entries, StrictTable
 from submissions.suggestions import join_with_or, suggest_name
-from submissions.sweep import CONDITIONS
 
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
 Slug = Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)

@@ -1,6 +1,6 @@
 """Criterion about image classification under harder conditions.
 
-The conditions are defined in ``sweep.py``.
+The conditions are defined in ``assignment/scenario.py``.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from submissions.assignment.scenario import Condition
 from submissions.criteria.common import AssignmentContext, UnmetRequirement
 from submissions.criteria.recognition import Recognition
-from submissions.sweep import Condition
 
 
 class Robustness(Recognition):

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from responders.channel import Channel
+from responders.channel import Cable, Channel
 from responders.conversation import Answer, Conversation
-from responders.link import Cable
 from sim.recording import SECOND, TICK, Fault, Verdict
 from sim.world import HashChain
 

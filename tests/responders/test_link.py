@@ -10,9 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from responders.channel import Channel, TrialChannel
+from responders.channel import Cable, Channel, InfraredLink, TrialChannel
 from responders.conversation import Answer, Conversation
-from responders.link import Cable, InfraredLink
 from running import run_program
 from service.grading.trial_runner import TrialRunner
 from service.store.grades.recordings import from_bytes, to_bytes

@@ -30,8 +30,7 @@ from rows import quick_first
 from running import run_program
 from service.grading.grader import grade
 from service.grading.trial_runner import TrialRunner
-from sim.line_trace import LineTrace
-from sim.recording import Fault, Recording, Verdict
+from sim.recording import Fault, LineTrace, Recording, Verdict
 from submissions.assignment.reader import find_assignment
 from submissions.bundle import read_submission
 

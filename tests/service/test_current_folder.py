@@ -125,7 +125,6 @@ def test_settings_for_plots_in_the_current_folder_change_no_plot(hostile: Path) 
 STARTERS = {
     "sim/processes.py",
     "responders/sandbox/zygote.py",
-    "responders/sandbox/zygote_command.py",
     "responders/sandbox/bubblewrap.py",
     "responders/sandbox/private_folders.py",
 }

@@ -15,8 +15,8 @@ from submissions.assignment.definition import Assignment, Parts, Scenario, World
 from submissions.assignment.export import export_for_students
 from submissions.assignment.problems import AssignmentProblems, find_lines
 from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.assignment.scenario import Sweep
 from submissions.criteria.code import Functions
-from submissions.sweep import Sweep
 
 _HEAD = 'id = "a"\ntitle = "A"\n'
 _FINISHES = '[[criterion]]\ntitle = "Ends"\nmarks = 1\ncheck = "finishes"\n'

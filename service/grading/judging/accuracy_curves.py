@@ -12,7 +12,7 @@ from itertools import pairwise
 from models.intervals import compute_wilson_interval
 from service.grading.grade import AccuracyCurve, Level, TrialResult
 from service.grading.judging.patterns import Sample
-from submissions.sweep import CONDITIONS
+from submissions.assignment.scenario import CONDITIONS
 
 _NOISES = ("light_noise", "motor_noise")
 

@@ -1,4 +1,4 @@
-"""Access to a responder's answer: its JSON, and the value at a path.
+"""Access to the answers of a responder, or of an agent: the pair that talks, the JSON, and the value at a path.
 
 Answers are student text, so nothing here raises, whatever they contain.
 """
@@ -8,12 +8,14 @@ from __future__ import annotations
 import json
 from bisect import bisect_left
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from responders.message_format import JSON, parse_answer
 from service.grading.judging.message_parts import describe_fault
 from sim.recording import Fault, Message, Recording
 from sim.sentences import Sentence
+from submissions.criteria.agent_pairs import AgentPairCriterion
 
 
 class MissingValue:
@@ -21,6 +23,8 @@ class MissingValue:
 
 
 MISSING = MissingValue()
+#: The note on an answer that is a JSON value instead of a text.
+VALUE = "value"
 
 
 def is_json_answer(text: str) -> bool:
@@ -114,3 +118,42 @@ class Answers:
         if fault is None:
             return Sentence("there was no answer")
         return Sentence("there was no answer: %(fault)s", fault=describe_fault(fault))
+
+
+@dataclass(frozen=True, slots=True)
+class AgentPair:
+    """The sender and receiver in words, and their messages presented as those of a robot and its responder.
+
+    ``first_words`` is the receiver at the beginning of a sentence.
+    """
+
+    sender_name: str
+    receiver_name: str
+    first_words: str
+    recording: Recording
+
+
+def build_pair(criterion: AgentPairCriterion, recording: Recording) -> AgentPair:
+    """Return the pair that a criterion checks: the robot and the responder, unless it names agents."""
+    if not criterion.agents:
+        names = (Sentence("the robot"), Sentence("the responder"), Sentence("The responder"))
+        return AgentPair(*names, recording)
+    sender, receiver = criterion.agents
+    messages: list[Message] = []
+    new_indices: dict[int, int] = {}
+    for index, message in enumerate(recording.agent_messages):
+        if (message.sender, message.receiver) == (sender, receiver):
+            new_indices[index] = len(messages)
+            messages.append(Message(message.t, "robot", message.text, message.t))
+        elif message.reply_to in new_indices:
+            note = "" if message.is_text else VALUE
+            messages.append(
+                Message(message.t, "responder", message.text, message.t, new_indices[message.reply_to], note)
+            )
+    faults = tuple(replace(fault, agent="") for fault in recording.faults if fault.agent == receiver)
+    return AgentPair(
+        Sentence("the %(agent)s", agent=sender),
+        Sentence("the %(agent)s", agent=receiver),
+        Sentence("The %(agent)s", agent=receiver),
+        replace(recording, messages=tuple(messages), faults=faults),
+    )

@@ -13,10 +13,9 @@ from itertools import pairwise
 
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import locate_footprint, locate_part
-from service.grading.judging.joined_texts import join_with_commas
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.label_patches import GREYS, decode_label
-from service.grading.judging.message_parts import quote_text
+from service.grading.judging.message_parts import join_with_commas, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.language import translatable
 from sim.floors import list_label_names

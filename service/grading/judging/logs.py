@@ -16,9 +16,8 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import Side, find_light_sensor, locate_footprint, measure_floor_share
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.label_patches import GREYS, decode_label
-from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.outcome import Outcome, Strays, apply_stray_penalty, fail_with, pass_with
 from service.grading.judging.sensor_readings import match_readings
-from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.language import translatable
 from sim.camera import HEIGHT, WIDTH, build_sensor_mask
 from sim.floors import Floor

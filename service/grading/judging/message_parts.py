@@ -5,10 +5,12 @@ The modules of the families write the messages themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 from service.grading.grade import TrialResult
 from service.grading.judging.outcome import Outcome, find_ending_fault
+from service.language import translatable
 from sim.recording import Fault, Verdict
 from sim.sentences import Sentence, join_sentences
 
@@ -81,3 +83,26 @@ def describe_early_end(trial: TrialResult, outcome: Outcome | None = None) -> st
     if fault.verdict is Verdict.TIME_LIMIT:
         return Sentence("The program was still running when time ran out, at %(seconds)g s.", seconds=fault.t)
     return Sentence("The run ended early, at %(seconds).2f s.", seconds=fault.t)
+
+
+def join_with_or(parts: Sequence[str]) -> str:
+    """Join the parts with "or"; empty for no parts."""
+    return _join(translatable("%(these)s or %(last)s"), parts)
+
+
+def join_with_commas(parts: Sequence[str]) -> str:
+    """Join the parts with commas; empty for no parts."""
+    return _join(translatable("%(these)s, %(last)s"), parts)
+
+
+def join_with_semicolons(parts: Sequence[str]) -> str:
+    """Join the parts with semicolons; empty for no parts."""
+    return _join(translatable("%(these)s; %(last)s"), parts)
+
+
+def _join(template: str, parts: Sequence[str]) -> str:
+    if len(parts) < 2:
+        return parts[0] if parts else ""
+    # Halves, because sentences must not be nested as deeply as a list is long.
+    middle = len(parts) // 2
+    return Sentence(template, these=_join(template, parts[:middle]), last=_join(template, parts[middle:]))

@@ -19,9 +19,9 @@ from service.grading.judging.geometry import (
     compute_positions,
     find_place,
 )
-from service.grading.judging.joined_texts import join_with_semicolons
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.matching import match_maximum_in_order, match_maximum_pairs
+from service.grading.judging.message_parts import join_with_semicolons
 from service.grading.judging.motion_descriptions import (
     describe_occurrence,
     describe_proportion,

@@ -22,7 +22,7 @@ from service.grading.judging.geometry import (
     find_true_runs,
     to_relative_position,
 )
-from service.grading.judging.joined_texts import join_with_commas
+from service.grading.judging.message_parts import join_with_commas
 from service.language import translatable
 from sim.recording import Recording
 from sim.recording_values import get_recorded_robot, tick_to_seconds

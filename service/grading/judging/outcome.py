@@ -1,4 +1,4 @@
-"""The outcome of one criterion in one trial, the fault that ended a program, and the value of outcomes.
+"""The outcome of one criterion in one trial: the fault that ended a program, the penalty for stray output, the value.
 
 The modules of the families decide who passes. Marks are exact fractions until they are rounded once at the end.
 """
@@ -9,17 +9,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from service.grading.findings import Finding
+from service.grading.findings import Finding, StrayItems
 from service.grading.grade import Measure
 from sim.recording import Fault, Pose, Recording, Verdict
+from sim.sentences import Sentence, join_sentences
+
+if TYPE_CHECKING:
+    from submissions.criteria.common import CriterionWithStrays
 
 _MAX_FAILED_SCORE = Fraction(99, 100)
 Over = Literal["share", "all", "mean", "median", "worst"]
 
 _CENT = Decimal("0.01")
 _STEPS = 20
+#: This many irrelevant items weigh as much as one required item in a wrong place.
+_OTHERS_PER_ITEM = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,3 +146,39 @@ def compute_steps_share(
         return Fraction(0)
     reached_marks = [worth for accuracy, worth in steps if Fraction(correct_count, count) >= Fraction(str(accuracy))]
     return Fraction(str(reached_marks[-1])) / Fraction(marks) if reached_marks else Fraction(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Strays:
+    """Stray items: output that was not required. ``words`` is a clause that describes it."""
+
+    words: str
+    misplaced: int = 0  # required items in a wrong place
+    others: int = 0  # items of the same kind that are not required
+
+    @property
+    def weight(self) -> Fraction:
+        """The weight, as a number of required items."""
+        return self.misplaced + Fraction(self.others, _OTHERS_PER_ITEM)
+
+
+def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, count: int, strays: Strays) -> Outcome:
+    """Reduce the outcome for ``count`` items: strays beyond the allowed number count like additional missing items."""
+    excess = strays.weight - (count if criterion.strays is None else criterion.strays)
+    if excess <= 0:
+        return outcome
+    return fail_with(
+        join_sentences(
+            outcome.message,
+            Sentence(
+                "Also, %(strays)s. This costs marks. Give only the required answers, not every possible one.",
+                strays=strays.words,
+            ),
+        ),
+        outcome.t,
+        outcome.pose,
+        outcome.score * count / (count + excess),
+        outcome.measures,
+        outcome.for_staff,
+        (*outcome.findings, StrayItems(strays.misplaced + strays.others, outcome.passed)),
+    )

@@ -20,7 +20,6 @@ from service.grading.judging.geometry import (
     find_true_runs,
     measure_segment_distance,
 )
-from service.grading.judging.joined_texts import join_with_semicolons
 from service.grading.judging.judge_declaration import (
     Case,
     IndexedTrials,
@@ -29,6 +28,7 @@ from service.grading.judging.judge_declaration import (
     judge_by_trial,
     summarise_trials,
 )
+from service.grading.judging.message_parts import join_with_semicolons
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.language import translatable
 from sim.recording import Floats, Recording

@@ -12,20 +12,21 @@ from fractions import Fraction
 from responders.message_format import JSON
 from service.grading.findings import OtherAnswer
 from service.grading.grade import TrialResult
-from service.grading.judging.agent_pairs import VALUE, AgentPair, build_pair
 from service.grading.judging.answers import (
     MISSING,
+    VALUE,
+    AgentPair,
     Answers,
     as_text,
+    build_pair,
     find_at_path,
     is_json_answer,
     is_same_value,
     parse_json_answer,
 )
 from service.grading.judging.channel_losses import describe_loss, is_lost_by_chance, is_out_of_reach
-from service.grading.judging.joined_texts import join_with_or
 from service.grading.judging.judge_declaration import declare_judge
-from service.grading.judging.message_parts import quote_list, quote_text
+from service.grading.judging.message_parts import join_with_or, quote_list, quote_text
 from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.text_conditions import describe_conditions, is_accepted_text, is_same_text
 from sim.recording import Message

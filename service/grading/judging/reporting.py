@@ -15,7 +15,7 @@ from service.grading.grade import Measure, TrialResult
 from service.grading.judging.geometry import describe_zone, is_in_zone, locate_part, locate_part_at_time
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
-from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.outcome import Outcome, Strays, apply_stray_penalty, fail_with, pass_with
 from service.grading.judging.report_places import describe_uncounted_report, select_counting_lines
 from service.grading.judging.report_rows import Entry, ReportTokens, Row, can_match_row, is_equivalent_row, is_near
 from service.grading.judging.report_sentences import (
@@ -29,7 +29,6 @@ from service.grading.judging.report_sentences import (
     format_entry,
 )
 from service.grading.judging.sensor_readings import INSTRUMENTS, match_readings
-from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.grading.judging.text_tokens import Token, find_words, split_words, tokenize_text
 from service.language import translatable
 from sim.floors import list_label_names

@@ -14,8 +14,7 @@ from service.grading.findings import ExtraText, HurriedSpeech, OtherWord
 from service.grading.grade import Measure, TrialResult
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
-from service.grading.judging.outcome import Outcome, fail_with, pass_with
-from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
+from service.grading.judging.outcome import Outcome, Strays, apply_stray_penalty, fail_with, pass_with
 from service.grading.judging.text_tokens import compute_speech_ends, split_words
 from service.language import translatable
 from sim.recording import Recording, TimedText

@@ -12,21 +12,13 @@ from fractions import Fraction
 
 from service.grading.findings import ExtraText
 from service.grading.grade import TrialResult
-from service.grading.judging.agent_pairs import build_pair
+from service.grading.judging.answers import build_pair
 from service.grading.judging.channel_losses import is_lost_by_chance
 from service.grading.judging.judge_declaration import declare_judge
 from service.grading.judging.message_parts import quote_list, quote_text
-from service.grading.judging.outcome import Outcome, fail_with, pass_with
+from service.grading.judging.outcome import Outcome, Strays, apply_stray_penalty, fail_with, pass_with
 from service.grading.judging.robot_queue import collect_queue_lines, is_queued, judge_queue_growth
-from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
 from service.grading.judging.text_conditions import (
-    describe_clauses,
-    describe_conditions,
-    is_accepted_text,
-    is_same_text,
-    normalise_text,
-)
-from service.grading.judging.text_wordings import (
     PRINT,
     RECEIVED_TEXT,
     RESPONDER_PRINT,
@@ -34,6 +26,11 @@ from service.grading.judging.text_wordings import (
     SPEECH,
     TextWording,
     build_agent_wording,
+    describe_clauses,
+    describe_conditions,
+    is_accepted_text,
+    is_same_text,
+    normalise_text,
 )
 from sim.recording import Recording, TimedText
 from sim.recording_values import get_pose_at

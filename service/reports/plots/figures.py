@@ -23,7 +23,7 @@ from service.reports.plots.track_images import find_worst_track
 from sim.floors.canvas import Pixels
 from sim.recording import Recording
 from sim.recording_values import rebuild_floor
-from submissions.sweep import CONDITIONS, VariedCondition
+from submissions.assignment.scenario import CONDITIONS, VariedCondition
 
 
 def draw_plot(grade: Grade, plot: Plot, images: Mapping[str, Pixels]) -> Drawing:

@@ -32,9 +32,9 @@ from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, Training, WorldSpec
 from submissions.assignment.limits import Limits
 from submissions.assignment.reader import find_assignment
+from submissions.assignment.scenario import Sweep
 from submissions.criteria import SCHEMAS, Criterion
 from submissions.submission import Cell, Notebook, Submission
-from submissions.sweep import Sweep
 
 POSES = tuple(Pose(200.0 + 80 * place, 900.0, 0.0) for place in range(6))
 

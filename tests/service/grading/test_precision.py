@@ -10,8 +10,7 @@ import pytest
 
 from driving import driven, straight
 from judging import criterion, judged
-from service.grading.judging.outcome import fail_with, pass_with
-from service.grading.judging.stray_penalty import Strays, apply_stray_penalty
+from service.grading.judging.outcome import Strays, apply_stray_penalty, fail_with, pass_with
 from sim.recording import DatalogEntry, Message, Recording, TimedText
 from submissions.criteria import SCHEMAS
 from submissions.criteria.common import CriterionWithStrays

@@ -34,10 +34,10 @@ from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.problems import AssignmentProblems
 from submissions.assignment.reader import read_assignment
+from submissions.assignment.scenario import Sweep
 from submissions.criteria import Criterion
 from submissions.criteria.classification import Classification
 from submissions.submission import Submission
-from submissions.sweep import Sweep
 
 pytestmark = pytest.mark.fast
 

@@ -23,9 +23,9 @@ from sim.recording import Pose
 from submissions.assignment.definition import Assignment, Parts, Scenario, WorldSpec
 from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment, read_assignment
+from submissions.assignment.scenario import CONDITIONS, Sweep
 from submissions.criteria.robustness import Robustness
 from submissions.submission import Submission
-from submissions.sweep import CONDITIONS, Sweep
 
 POSES = (Pose(200, 900, 0), Pose(280, 900, 0), Pose(360, 900, 0))
 SAYS_SQUARE = """

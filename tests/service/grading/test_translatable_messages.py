@@ -11,7 +11,7 @@ import pytest
 
 from service.grading import judging
 from service.grading.judging.robustness import CONDITION_WORDS
-from submissions.sweep import CONDITIONS
+from submissions.assignment.scenario import CONDITIONS
 
 _FOLDER = Path(judging.__path__[0])
 _MODULES = sorted(path.stem for path in _FOLDER.glob("*.py"))

@@ -15,7 +15,7 @@ import pytest
 
 from judging import criterion, judged, lines, recorded, talk
 from service.grading.judging.code import judge_source
-from service.grading.judging.joined_texts import join_with_commas, join_with_or, join_with_semicolons
+from service.grading.judging.message_parts import join_with_commas, join_with_or, join_with_semicolons
 from service.grading.judging.source_answers import SourceAnswers
 from service.language import Language
 from service.message_catalogue import extract_messages
