@@ -19,6 +19,14 @@ class StrictTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
+class TableMistake(ValueError):
+    """A mistake in a whole table, raised by a validator. ``key`` is the key whose line shows it."""
+
+    def __init__(self, key: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.key = key
+
+
 @dataclass(frozen=True, slots=True)
 class Entries:
     """Annotation of a fixed-length list type: describes its entries in messages about a wrong length."""

@@ -24,7 +24,7 @@ from sim.robot import ROBOTS
 from submissions.assignment.limits import DEFAULT_LIMITS
 from submissions.assignment.scenario import CONDITIONS
 from submissions.assignment.table_problems import NUMBER_TAG, TABLE_TAG, format_short
-from submissions.strict_table import Entries, StrictTable
+from submissions.strict_table import Entries, StrictTable, TableMistake
 from submissions.suggestions import join_with_or, suggest_name
 
 Levels = Annotated[tuple[float, ...], Field(max_length=100)]
@@ -120,13 +120,18 @@ class ChannelTable(StrictTable):
     def _check_link(self) -> Self:
         unused_keys = self.model_fields_set & {"beacon", "range", "facing", "blocked_by"}
         if self.link == "cable" and unused_keys:
-            raise ValueError(f'has {min(unused_keys)} and no link that it limits, expected link = "infrared" beside it')
+            raise TableMistake(
+                min(unused_keys),
+                f'has {min(unused_keys)} and no link that it limits, expected link = "infrared" beside it',
+            )
         if self.link == "between robots" and self.beacon is not None:
-            raise ValueError("has a beacon, but the robots talk to each other, expected no beacon with this link")
+            raise TableMistake(
+                "beacon", "has a beacon, but the robots talk to each other, expected no beacon with this link"
+            )
         if self.link == "infrared" and self.beacon is None:
-            raise ValueError('has link = "infrared" and no beacon, expected beacon = [x, y] beside it')
+            raise TableMistake("link", 'has link = "infrared" and no beacon, expected beacon = [x, y] beside it')
         if self.beacon is not None and not (0 < self.beacon[0] < WIDTH and 0 < self.beacon[1] < HEIGHT):
-            raise ValueError(f"has a beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
+            raise TableMistake("beacon", f"has a beacon off the floor, expected it within {WIDTH} x {HEIGHT} mm")
         return self
 
 

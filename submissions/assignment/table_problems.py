@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from submissions.strict_table import Entries
+from submissions.strict_table import Entries, TableMistake
 from submissions.suggestions import join_with_or, suggest_name
 
 T = TypeVar("T", bound=BaseModel)
@@ -90,8 +90,9 @@ def describe_problem(schema: type[BaseModel], details: ErrorDetails) -> TablePro
             return TableProblem(path[:-1], sentence)
         return TableProblem(path[:-1], f"{name} is missing, expected {name} = ...")
     if kind in ("value_error", "assertion_error"):
-        sentence = details["msg"].partition(", ")[2]
-        return TableProblem(path or _find_key(sentence, details["input"]), f"{_format_path(path)} {sentence}")
+        error = context["error"]
+        keys = (error.key,) if isinstance(error, TableMistake) else ()
+        return TableProblem((*path, *keys), f"{_format_path(path)} {error}")
     value = format_short(details["input"])
     if kind in _TYPES:
         return TableProblem(path, f"{_format_path(path)} is {value}, expected {_TYPES[kind]}")
@@ -118,12 +119,6 @@ def describe_problem(schema: type[BaseModel], details: ErrorDetails) -> TablePro
             path, f"{_format_path(path)} is too long, expected at most {context['max_length']} characters"
         )
     return TableProblem(path, f"{_format_path(path)} is {value}, but {details['msg'][:1].lower()}{details['msg'][1:]}")
-
-
-def _find_key(sentence: str, table: object) -> tuple[str, ...]:
-    """Return the key that a sentence about the whole table mentions, to locate its line; empty if it mentions none."""
-    words = re.findall(r"\w+", sentence.partition(", expected")[0])
-    return tuple([word for word in words if isinstance(table, dict) and word in table][:1])
 
 
 def _describe_unknown_key(schema: type[BaseModel], path: tuple[str | int, ...]) -> str:

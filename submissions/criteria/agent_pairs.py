@@ -11,6 +11,7 @@ from typing import Self
 from pydantic import field_validator, model_validator
 
 from submissions.criteria.common import AssignmentContext, Criterion, SomeTexts, UnmetRequirement
+from submissions.strict_table import TableMistake
 
 _ROBOT_OPTIONS = ("is_json", "path", "value", "json_queue", "queue_grows")
 _RESPONDER = "responder"
@@ -37,7 +38,9 @@ class AgentPairCriterion(Criterion):
         option = next((name for name in _ROBOT_OPTIONS if self.agents and getattr(self, name, None)), None)
         if option is not None:
             option_name = "json" if option == "json_queue" else option
-            raise ValueError(f"has {option_name} beside agents, expected conditions for the text (JSON for a list)")
+            raise TableMistake(
+                "agents", f"has {option_name} beside agents, expected conditions for the text (JSON for a list)"
+            )
         return self
 
     def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:

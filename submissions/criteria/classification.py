@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import model_validator
 
 from submissions.criteria.recognition import Recognition
-from submissions.strict_table import Entries
+from submissions.strict_table import Entries, TableMistake
 
 
 class Classification(Recognition):
@@ -32,11 +32,15 @@ class Classification(Recognition):
         if not self.steps:
             return self
         if self.at_least is not None or self.over == "all":
-            raise ValueError('has steps beside at_least or over = "all", expected one or the other')
+            raise TableMistake("steps", 'has steps beside at_least or over = "all", expected one or the other')
         if any(not (low[0] < high[0] and low[1] <= high[1]) for low, high in pairwise(self.steps)):
-            raise ValueError("has steps that do not ascend, expected [[accuracy, marks], ...], the easiest first")
+            raise TableMistake(
+                "steps", "has steps that do not ascend, expected [[accuracy, marks], ...], the easiest first"
+            )
         if not (self.steps[0][0] > 0 and self.steps[-1][0] <= 1 and self.steps[0][1] >= 0):
-            raise ValueError("has a step out of range, expected accuracies above 0 up to 1 and marks from 0")
+            raise TableMistake("steps", "has a step out of range, expected accuracies above 0 up to 1 and marks from 0")
         if abs(self.steps[-1][1] - float(self.marks)) > 1e-9:
-            raise ValueError(f"has a last step of {self.steps[-1][1]:g} marks, expected {self.marks}: all there are")
+            raise TableMistake(
+                "steps", f"has a last step of {self.steps[-1][1]:g} marks, expected {self.marks}: all there are"
+            )
         return self

@@ -22,7 +22,7 @@ from submissions.criteria.common import (
     UnmetRequirement,
 )
 from submissions.magics import Flags, parse_flags
-from submissions.strict_table import StrictTable
+from submissions.strict_table import StrictTable, TableMistake
 
 _MAX_ANSWER_DIGITS = 300
 #: Words that denote a construct. Other entries are names.
@@ -109,7 +109,7 @@ class SourceRules(Criterion):
         if not (self.uses or self.avoids or self.in_loop or self.defines or self.flags):
             raise ValueError("has no condition, expected uses, avoids, in_loop, defines or flags")
         if self.flags and self.part != "program":
-            raise ValueError("has flags for the responder, expected them for the program")
+            raise TableMistake("flags", "has flags for the responder, expected them for the program")
         return self
 
 
@@ -130,7 +130,7 @@ class ExpectedCall(StrictTable):
     def _check_expectation(self) -> Self:
         # A function that does nothing returns None, so a call without an expected value would always pass.
         if "returns" not in self.model_fields_set and not self.one_of:
-            raise ValueError("has a call without returns or one_of, expected the result of the function")
+            raise TableMistake("returns", "has a call without returns or one_of, expected the result of the function")
         return self
 
 
@@ -197,16 +197,16 @@ class Functions(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if not self.calls and not self.table:
-            raise ValueError("needs calls or a table, expected one of them")
+            raise TableMistake("calls", "needs calls or a table, expected one of them")
         if any(before.hidden and not after.hidden for before, after in pairwise(self.calls)):
             # The function could store hidden arguments and reveal them during a visible call.
-            raise ValueError("has a hidden call before one that is not, expected the hidden ones last")
+            raise TableMistake("calls", "has a hidden call before one that is not, expected the hidden ones last")
         if self.each and not all(isinstance(call.returns, list | tuple) and call.returns for call in self.calls):
-            raise ValueError("has each with a call that returns no list, expected a list in every returns")
+            raise TableMistake("each", "has each with a call that returns no list, expected a list in every returns")
         if self.each and self.table:
-            raise ValueError("has each beside a table, expected a value in each row")
+            raise TableMistake("each", "has each beside a table, expected a value in each row")
         if self.at_least < 1 and not self.each and not self.table:
-            raise ValueError("has at_least without each, expected each = true beside it")
+            raise TableMistake("at_least", "has at_least without each, expected each = true beside it")
         return self
 
 

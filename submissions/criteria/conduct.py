@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from responders.conduct import BreachKind
 from submissions.criteria.common import Criterion, Texts
+from submissions.strict_table import TableMistake
 
 
 class Conduct(Criterion):
@@ -34,5 +35,5 @@ class Conduct(Criterion):
     @model_validator(mode="after")
     def _check_forbids_anything(self) -> Conduct:
         if not self.forbidden_kinds:
-            raise ValueError("allows all breaches, expected fewer in allows")
+            raise TableMistake("allows", "allows all breaches, expected fewer in allows")
         return self

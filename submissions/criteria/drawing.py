@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
+from submissions.strict_table import TableMistake
 
 _Legs = Annotated[int, Field(ge=1, le=100)]
 _Angle = Annotated[float, Field(gt=0, le=180)]
@@ -65,16 +66,21 @@ class Drawing(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if isinstance(self.legs, tuple) and self.figures not in (1, len(self.legs)):
-            raise ValueError(f"has {len(self.legs)} numbers in legs, expected one for each of {self.figures} figures")
+            raise TableMistake(
+                "legs", f"has {len(self.legs)} numbers in legs, expected one for each of {self.figures} figures"
+            )
         if isinstance(self.angle, tuple) and len(self.angle) != self.figure_count:
-            raise ValueError(
-                f"has {len(self.angle)} numbers in angle, expected one for each of {self.figure_count} figures"
+            raise TableMistake(
+                "angle", f"has {len(self.angle)} numbers in angle, expected one for each of {self.figure_count} figures"
             )
         if self.at_least and isinstance(self.legs, tuple):
-            raise ValueError("has at_least beside a list of legs, expected one number of legs for all figures")
+            raise TableMistake(
+                "at_least", "has at_least beside a list of legs, expected one number of legs for all figures"
+            )
         if self.sizes and len(self.sizes) != self.figure_count:
-            raise ValueError(
+            raise TableMistake(
+                "sizes",
                 f"has {len(self.sizes)} sizes for {self.figure_count} figures, "
-                "expected one [least, most] for each figure"
+                "expected one [least, most] for each figure",
             )
         return self

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Area, Range, Zone
-from submissions.strict_table import StrictTable
+from submissions.strict_table import StrictTable, TableMistake
 
 
 class Finishes(Criterion):
@@ -65,7 +65,7 @@ class EndPose(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if (self.x is None) != (self.y is None):
-            raise ValueError("has one of x and y, expected both")
+            raise TableMistake("x", "has one of x and y, expected both")
         conditions = (self.x, self.heading, self.zone, self.areas or None, self.since)
         if all(each is None for each in conditions):
             raise ValueError("has no condition, expected x and y, heading, zone, areas or since")

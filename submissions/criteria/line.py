@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import LineToFollow, Part, Range
-from submissions.strict_table import Entries
+from submissions.strict_table import Entries, TableMistake
 
 
 class Follows(Criterion):
@@ -38,7 +38,7 @@ class Follows(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if self.at_most is not None and self.at_most < self.within:
-            raise ValueError("has an at_most below its within, expected at_most >= within")
+            raise TableMistake("at_most", "has an at_most below its within, expected at_most >= within")
         return self
 
 
@@ -61,7 +61,7 @@ class Laps(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if not self.line.is_closed:
-            raise ValueError("has a line with two ends, expected a closed one (closed = true)")
+            raise TableMistake("line", "has a line with two ends, expected a closed one (closed = true)")
         if self.start_line[:2] == self.start_line[2:]:
-            raise ValueError("has a start line without length, expected [x1, y1, x2, y2]")
+            raise TableMistake("line", "has a start line without length, expected [x1, y1, x2, y2]")
         return self

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, CriterionWithStrays, Texts
 from submissions.criteria.places import Range
+from submissions.strict_table import TableMistake
 
 #: Instruments that a series can be a log of.
 Instrument = Literal["left light", "right light", "ultrasonic", "gyro", "left wheel", "right wheel"]
@@ -48,9 +49,11 @@ class Datalog(CriterionWithStrays):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if self.at_most is not None and self.at_most < self.at_least:
-            raise ValueError("has an at_least above its at_most, expected at_least <= at_most")
+            raise TableMistake("at_least", "has an at_least above its at_most, expected at_least <= at_most")
         if any(abs(one - other) <= self.tolerance for one, other in pairwise(self.plateaus)):
-            raise ValueError("has two plateaus in a row that the tolerance makes one, expected them to differ")
+            raise TableMistake(
+                "plateaus", "has two plateaus in a row that the tolerance makes one, expected them to differ"
+            )
         return self
 
 

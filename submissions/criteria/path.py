@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Area, Part
+from submissions.strict_table import TableMistake
 
 
 class Visits(Criterion):
@@ -31,7 +32,9 @@ class Visits(Criterion):
     @model_validator(mode="after")
     def _check_visit_count(self) -> Self:
         if self.at_least is not None and self.at_least > len(self.places):
-            raise ValueError(f"has at_least = {self.at_least} of {len(self.places)} places, expected as many or fewer")
+            raise TableMistake(
+                "at_least", f"has at_least = {self.at_least} of {len(self.places)} places, expected as many or fewer"
+            )
         return self
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from sim.floors.centrelines import load_centrelines
-from submissions.strict_table import Entries, StrictTable
+from submissions.strict_table import Entries, StrictTable, TableMistake
 
 #: The measured point: the middle of the axle, the pen's drawing, or a light sensor.
 Part = Literal["robot", "pen", "left_light", "right_light"]
@@ -58,13 +58,15 @@ class Area(StrictTable):
         if self.rectangle is not None:
             left, bottom, right, top = self.rectangle
             if not (left < right and bottom < top):
-                raise ValueError("has an empty rectangle, expected [left, bottom, right, top]")
+                raise TableMistake("rectangle", "has an empty rectangle, expected [left, bottom, right, top]")
         if self.circle is not None and not self.circle[2] > 0:
-            raise ValueError("has a circle without a radius, expected [x, y, radius]")
+            raise TableMistake("circle", "has a circle without a radius, expected [x, y, radius]")
         if self.bar is not None and not self.bar[4] > 0:
-            raise ValueError("has a bar without a radius, expected [x1, y1, x2, y2, radius]")
+            raise TableMistake("bar", "has a bar without a radius, expected [x1, y1, x2, y2, radius]")
         if self.polygon is not None and len(self.polygon) < 3:
-            raise ValueError("has a polygon of fewer than three corners, expected [[x, y], [x, y], [x, y], ...]")
+            raise TableMistake(
+                "polygon", "has a polygon of fewer than three corners, expected [[x, y], [x, y], [x, y], ...]"
+            )
         return self
 
 
@@ -101,11 +103,13 @@ class LineToFollow(StrictTable):
         if sum(kind is not None for kind in (self.on, self.points, self.ellipse)) != 1:
             raise ValueError("is not a line, expected one of on, points and ellipse")
         if not 0 < abs(self.arc[1] - self.arc[0]) <= 360:
-            raise ValueError("has an arc of no length or of more than 360 degrees, expected arc = [from, to]")
+            raise TableMistake("arc", "has an arc of no length or of more than 360 degrees, expected arc = [from, to]")
         if self.ellipse is not None and not (self.ellipse[2] > 0 and self.ellipse[3] > 0):
-            raise ValueError("has an ellipse without radii, expected [x, y, horizontal radius, vertical radius]")
+            raise TableMistake(
+                "ellipse", "has an ellipse without radii, expected [x, y, horizontal radius, vertical radius]"
+            )
         if len(self.corners()) < 2 or self.length() <= 0:
-            raise ValueError("has a line of fewer than two points, expected points = [[x, y], [x, y], ...]")
+            raise TableMistake("points", "has a line of fewer than two points, expected points = [[x, y], [x, y], ...]")
         return self
 
     def corners(self) -> tuple[Point, ...]:

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
 from submissions.criteria.places import Range
+from submissions.strict_table import TableMistake
 
 
 class Closest(Criterion):
@@ -57,7 +58,9 @@ class Circuits(Criterion):
     @model_validator(mode="after")
     def _check_whole_rounds(self) -> Self:
         if (self.gyro is not None or self.corners is not None) and self.times[0] < 1:
-            raise ValueError("looks at whole rounds with gyro or corners, expected times to begin at 1 or above")
+            raise TableMistake(
+                "gyro", "looks at whole rounds with gyro or corners, expected times to begin at 1 or above"
+            )
         return self
 
 

@@ -21,6 +21,7 @@ from submissions.criteria.common import (
     TextOrTexts,
     UnmetRequirement,
 )
+from submissions.strict_table import TableMistake
 
 #: Grey level of a patch.
 Grey = Annotated[int, Field(ge=0, le=255)]
@@ -140,18 +141,23 @@ class Recognition(Criterion):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if (self.truth == "places") != bool(self.places):
-            raise ValueError('needs truth = "places" and places together, expected both or neither')
+            raise TableMistake("truth", 'needs truth = "places" and places together, expected both or neither')
         if self.greys and self.truth != "grey":
-            raise ValueError('has greys without truth = "grey", expected both or neither')
+            raise TableMistake("greys", 'has greys without truth = "grey", expected both or neither')
         levels = sorted(self.greys.values()) if isinstance(self.greys, dict) else []
         if any(after - before < _GREYS_APART for before, after in pairwise(levels)):
-            raise ValueError(f"has greys that are too similar, expected them {_GREYS_APART} or more apart")
+            raise TableMistake("greys", f"has greys that are too similar, expected them {_GREYS_APART} or more apart")
         if self.patterns and self.each_pattern is None:
-            raise ValueError('has patterns without each_pattern, expected each_pattern = "majority" or the like')
+            raise TableMistake(
+                "patterns", 'has patterns without each_pattern, expected each_pattern = "majority" or the like'
+            )
         if self.each_pattern is not None and (self.images != "all" or isinstance(self.truth, tuple)):
-            raise ValueError(
-                "has each_pattern beside images or a list of truths, expected it with labels from the floor or places"
+            raise TableMistake(
+                "each_pattern",
+                "has each_pattern beside images or a list of truths, expected it with labels from the floor or places",
             )
         if self.answer_from != "reply" and (self.confidence is not None or self.late == "wrong"):
-            raise ValueError(f'has confidence or late beside answer_from = "{self.answer_from}", expected replies')
+            raise TableMistake(
+                "confidence", f'has confidence or late beside answer_from = "{self.answer_from}", expected replies'
+            )
         return self

@@ -10,6 +10,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from submissions.criteria.common import Criterion, Texts
+from submissions.strict_table import TableMistake
 
 #: Values that a recording has in every tick.
 Series = Literal[
@@ -50,5 +51,5 @@ class Relation(Criterion):
     @model_validator(mode="after")
     def _check_two_series(self) -> Self:
         if self.of == self.to:
-            raise ValueError("has the same series in of and to, expected two")
+            raise TableMistake("of", "has the same series in of and to, expected two")
         return self

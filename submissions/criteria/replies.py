@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from submissions.criteria.agent_pairs import AgentPairCriterion
 from submissions.criteria.common import SomeTextOrTexts, SomeTexts, Texts
 from submissions.criteria.texts import TextConditions
+from submissions.strict_table import TableMistake
 
 
 class Replies(AgentPairCriterion, TextConditions):
@@ -51,16 +52,20 @@ class Replies(AgentPairCriterion, TextConditions):
     @model_validator(mode="after")
     def _check_options(self) -> Self:
         if self.value is not None and self.path is None:
-            raise ValueError('has value without path, expected path = "message" or the like beside it')
+            raise TableMistake("value", 'has value without path, expected path = "message" or the like beside it')
         if self.expect and (self.to or self.to_starts_with or self.has_conditions or self.value is not None):
-            raise ValueError("has expect beside other conditions, expected expect alone (with path and ignore_case)")
+            raise TableMistake(
+                "expect", "has expect beside other conditions, expected expect alone (with path and ignore_case)"
+            )
         if self.in_order and (self.expect or self.has_conditions or self.value is not None):
-            raise ValueError(
-                "has in_order beside other conditions, expected in_order alone (with path and ignore_case)"
+            raise TableMistake(
+                "in_order", "has in_order beside other conditions, expected in_order alone (with path and ignore_case)"
             )
         allowed_answers = [answer for each in self.expect.values() for answer in list_allowed_answers(each)]
         if self.path is None and not self.agents and any(not isinstance(answer, str) for answer in allowed_answers):
-            raise ValueError("has an answer in expect that is not a text, expected texts, or path beside them")
+            raise TableMistake(
+                "expect", "has an answer in expect that is not a text, expected texts, or path beside them"
+            )
         return self
 
 

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from submissions.assignment.scenario import Condition
 from submissions.criteria.common import AssignmentContext, UnmetRequirement
 from submissions.criteria.recognition import Recognition
+from submissions.strict_table import TableMistake
 
 
 class Robustness(Recognition):
@@ -45,5 +46,7 @@ class Robustness(Recognition):
     @model_validator(mode="after")
     def _check_level(self) -> Self:
         if (self.level is not None) != (self.marks_from == "falls_below"):
-            raise ValueError('needs level with marks_from = "falls_below", and only there, expected both or neither')
+            raise TableMistake(
+                "level", 'needs level with marks_from = "falls_below", and only there, expected both or neither'
+            )
         return self

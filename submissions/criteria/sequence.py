@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from submissions.criteria.common import CriterionWithStrays, Texts, as_tuple
+from submissions.strict_table import TableMistake
 
 
 class WordSequence(CriterionWithStrays):
@@ -45,5 +46,5 @@ class WordSequence(CriterionWithStrays):
     @model_validator(mode="after")
     def _check_waits(self) -> Self:
         if self.waits and self.source != "speech":
-            raise ValueError('has waits with source = "print", expected it with speech')
+            raise TableMistake("waits", 'has waits with source = "print", expected it with speech')
         return self

@@ -12,6 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from submissions.criteria.agent_pairs import AgentPairCriterion
 from submissions.criteria.common import Criterion, CriterionWithStrays, NotBlank, SomeTextOrTexts, SomeTexts
 from submissions.criteria.expressions import check_pattern
+from submissions.strict_table import TableMistake
 
 
 class TextConditions(Criterion):
@@ -60,28 +61,30 @@ class TextSequence(TextConditions, CriterionWithStrays):
                 "at_least, at_most, exactly"
             )
         if self.exactly is not None and (self.at_least is not None or self.at_most is not None):
-            raise ValueError("has exactly beside at_least or at_most, expected one or the other")
+            raise TableMistake("exactly", "has exactly beside at_least or at_most, expected one or the other")
         if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
-            raise ValueError("has an at_least above its at_most, expected at_least <= at_most")
+            raise TableMistake("at_least", "has an at_least above its at_most, expected at_least <= at_most")
         if self.in_order and (has_count or self.last):
-            raise ValueError(
+            raise TableMistake(
+                "in_order",
                 "has in_order beside a count or last, "
-                "expected in_order alone (with only = true if nothing else may come)"
+                "expected in_order alone (with only = true if nothing else may come)",
             )
         if self.last and has_count:
-            raise ValueError("has last beside a count, expected one or the other")
+            raise TableMistake("last", "has last beside a count, expected one or the other")
         if self.last and not self.has_conditions:
-            raise ValueError(
-                "has last without a condition, expected equals, contains, starts_with, matches or among beside it"
+            raise TableMistake(
+                "last",
+                "has last without a condition, expected equals, contains, starts_with, matches or among beside it",
             )
         if self.only and not self.in_order:
-            raise ValueError("has only without in_order, expected the texts in order")
+            raise TableMistake("only", "has only without in_order, expected the texts in order")
         if self.compare == "matches":
             for pattern in self.in_order:
                 try:
                     check_pattern(pattern)
                 except ValueError as error:
-                    raise ValueError(f'has "{pattern}" in in_order, which {error}') from None
+                    raise TableMistake("in_order", f'has "{pattern}" in in_order, which {error}') from None
         return self
 
     def _has_other_conditions(self) -> bool:
@@ -131,7 +134,7 @@ class Messages(AgentPairCriterion, TextSequence):
     @model_validator(mode="after")
     def _check_path(self) -> Self:
         if self.path is not None and not self.json_queue:
-            raise ValueError("has path without json, expected json = true beside it")
+            raise TableMistake("path", "has path without json, expected json = true beside it")
         return self
 
     def _has_other_conditions(self) -> bool:

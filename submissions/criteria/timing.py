@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from submissions.criteria.common import AssignmentContext, Criterion, Texts, UnmetRequirement
 from submissions.criteria.places import Range
-from submissions.strict_table import Entries
+from submissions.strict_table import Entries, TableMistake
 from submissions.suggestions import join_with_or, suggest_name
 
 
@@ -74,7 +74,9 @@ class Ranking(Criterion):
     def _check_step_order(self) -> Self:
         for first, second in pairwise(self.steps):
             if (first[0] >= second[0]) != self.highest or first[1] <= second[1]:
-                raise ValueError("has steps out of order, expected the best first, each worth less than the one before")
+                raise TableMistake(
+                    "steps", "has steps out of order, expected the best first, each worth less than the one before"
+                )
         if not all(0 <= share <= 1 for _, share in self.steps):
-            raise ValueError("has a share out of range in steps, expected from 0 to 1")
+            raise TableMistake("steps", "has a share out of range in steps, expected from 0 to 1")
         return self

@@ -11,6 +11,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from submissions.criteria.common import AssignmentContext, Criterion, UnmetRequirement
+from submissions.strict_table import TableMistake
 
 
 class Apart(Criterion):
@@ -33,7 +34,7 @@ class Apart(Criterion):
         if self.at_most is None and self.at_least == 0:
             raise ValueError("has no condition, expected at_least or at_most")
         if self.at_most is not None and self.at_most < self.at_least:
-            raise ValueError("has an at_most below at_least, expected room between them")
+            raise TableMistake("at_most", "has an at_most below at_least, expected room between them")
         return self
 
     def find_unmet_requirements(self, context: AssignmentContext) -> Iterator[UnmetRequirement]:
