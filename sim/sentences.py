@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Literal, Self
 
@@ -14,8 +14,9 @@ from typing import Literal, Self
 class Sentence(str):
     """An English text made of a template with ``%(name)s`` for each value; formats such as ``%(name).2f`` work too.
 
-    Values may be sentences themselves. Without values, the template is literal. Operations on it, such as
-    concatenation, return plain text that cannot be translated: use ``join_sentences`` and nested sentences.
+    Values may be sentences themselves. A value that the template does not name is for code that reads the sentence.
+    Without values, the template is literal. Operations on it, such as concatenation, return plain text that cannot be
+    translated: use ``join_sentences`` and nested sentences.
     """
 
     __slots__ = ("template", "values")
@@ -51,6 +52,23 @@ def join_sentences(*sentences: str) -> str:
     """Join sentences with spaces; empty ones are left out."""
     first, *others = [each for each in sentences if each] or [""]
     return Sentence(_PAIR, first=first, second=join_sentences(*others)) if others else first
+
+
+def iterate_values(sentence: str) -> Iterator[tuple[str, object]]:
+    """Yield the names and values of a sentence and of the sentences that are its values, from the outside in."""
+    if isinstance(sentence, Sentence):
+        yield from sentence.values.items()
+        for value in sentence.values.values():
+            if isinstance(value, Sentence):
+                yield from iterate_values(value)
+
+
+def find_opening(sentence: str, template: str) -> Sentence | None:
+    """Return the sentence with this template if ``sentence`` is one or begins with one; otherwise None."""
+    while isinstance(sentence, Sentence) and sentence.template != template:
+        opening = sentence.values.get(_find_edge_part(sentence.template, 0))
+        sentence = opening if isinstance(opening, Sentence) else ""
+    return sentence if isinstance(sentence, Sentence) else None
 
 
 _PART = re.compile(r"%\((\w+)\)s")

@@ -312,6 +312,7 @@ def _hint_about_near_keys(clues: Clues) -> Iterator[str]:
                     place=line,
                     key=quote_text(similar_keys[0]),
                     expected=quote_text(key),
+                    criterion=criterion.id,
                 )
                 return
 

@@ -14,6 +14,7 @@ from typing import TypeVar
 from service.grading.findings import Finding
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.hint_code import CodeStatements, read_code
+from service.grading.judging.message_parts import describe_line
 from service.grading.run_plan import RunPlan
 from sim.recording import Fault, Message, Recording
 from sim.recording_values import collect_faults, is_stationary
@@ -60,7 +61,7 @@ class Listing:
 
     def locate(self, line: int | None) -> str:
         """Return ``line 3 of robot.py``, or only the name if the line is unknown."""
-        return self.name if line is None else Sentence("line %(line)s of %(name)s", line=line, name=self.name)
+        return self.name if line is None else describe_line(self.name, line)
 
 
 @dataclass(frozen=True, slots=True)

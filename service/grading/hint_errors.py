@@ -51,7 +51,7 @@ from service.grading.hint_value_sources import (
     advise_on_percentage,
     advise_on_quoted_amount,
 )
-from service.grading.judging.message_parts import quote_text
+from service.grading.judging.message_parts import describe_fault, quote_text
 from service.language import translatable
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
@@ -125,9 +125,11 @@ def _hint_about_error(fault: Fault, clues: Clues) -> Iterator[str]:
             "the name to be defined",
             place=location,
             name=values[0],
+            fault=describe_fault(fault),
         )
         return
-    yield Sentence("%(place)s: %(problem)s", place=location, problem=describe_error(fault, clues))
+    problem = describe_error(fault, clues)
+    yield Sentence("%(place)s: %(problem)s", place=location, problem=problem, fault=describe_fault(fault))
 
 
 def describe_error(fault: Fault, clues: Clues) -> str:

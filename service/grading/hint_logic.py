@@ -18,7 +18,7 @@ from service.grading.hint_tables import LIMITED_MOVES
 from service.grading.judging.geometry import to_relative_position
 from service.language import translatable
 from sim.recording import Pose, Recording
-from sim.sentences import Sentence
+from sim.sentences import Sentence, iterate_values
 from submissions.criteria.ending import EndPose
 from submissions.criteria.motion import Excursions
 from submissions.criteria.sequence import WordSequence
@@ -39,8 +39,8 @@ def hint_about_range_start(clues: Clues) -> Iterator[str]:
             continue
         end, variable = listing.code.number(call.arguments[1]), statement.tokens[1]
         is_used = any(one.has_token(variable) for one in listing.code.list_body(statement))
-        pass_counts = {str(int(end)), str(int(end) - 1)} if end is not None and end > 1 else set()
-        number_sets = (set(re.findall(r"\d+", _join_messages(clues, one.id))) for one in clues.lost)
+        pass_counts = {end, end - 1} if end is not None and end > 1 else set()
+        number_sets = (_collect_values(clues, one.id) for one in clues.lost)
         if end is not None and pass_counts and not is_used and any(pass_counts <= numbers for numbers in number_sets):
             yield Sentence(
                 "%(place)s: range(1, %(end)s) counts from 1 to %(last)g, so the loop runs %(last)g times. To run "
@@ -321,6 +321,8 @@ def _list_parameters(head: Statement) -> list[str]:
     ]
 
 
-def _join_messages(clues: Clues, identity: str) -> str:
+def _collect_values(clues: Clues, identity: str) -> set[object]:
+    """Return the values in the messages of a criterion: the numbers that it expected and found, among others."""
     result = next((each for each in clues.results if each.id == identity), None)
-    return "" if result is None else " ".join((result.message, *(each.message for each in result.evidence)))
+    messages = (result.message, *(each.message for each in result.evidence)) if result is not None else ()
+    return {value for message in messages for _, value in iterate_values(message)}

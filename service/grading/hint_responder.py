@@ -15,7 +15,7 @@ from service.grading.hint_clues import Clues, Listing, find_listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_files import hint_about_redefined_functions
 from service.grading.hint_formats import describe_return_line, hint_about_answers
-from service.grading.judging.message_parts import quote_text
+from service.grading.judging.message_parts import describe_fault, quote_text
 from service.language import translatable
 from sim.sentences import Sentence
 from submissions.raw_files import sanitise_name
@@ -218,6 +218,7 @@ def hint_about_unreadable_answers(clues: Clues) -> Iterator[str]:
                 place=listing.locate(return_statement.line),
                 problem=fault.message.rstrip("."),
                 advice=Sentence("Write json.dumps(...) instead of str(...)") if str_returns else fault.hint,
+                fault=describe_fault(fault),
             )
             return
 

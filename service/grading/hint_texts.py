@@ -104,6 +104,7 @@ def _hint_about_criteria(criteria: Iterable[Criterion], clues: Clues) -> Iterato
                     "%(problem)s; expected %(expected)s",
                     problem=Sentence(template, place=place, text=quote_text(similar_text)),
                     expected=expected_text.describe(),
+                    criterion=criterion.id,
                 )
                 yield Sentence("%(problem)s. %(advice)s", problem=problem, advice=advice) if advice else problem
                 break

@@ -5,13 +5,13 @@ It explains and does not judge: marks don't depend on it. It uses only what the 
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade, ShownCause
+from service.grading.judging.message_parts import find_line, states_fault
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_display_text, to_one_line
 from service.reports.faults import SourceLine, extract_excerpt, find_named_source, group_faults
@@ -26,13 +26,11 @@ from service.reports.verdict_sentences import (
 )
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
-from sim.sentences import join_sentences
+from sim.sentences import iterate_values, join_sentences
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
 
-_PLACE = re.compile(r"[Ll]ine (\d+) of (cell \d+|\S+?)(?=[:,]? )")
-_QUOTED = re.compile(r'"([^"]{2,})"')
-#: A hint on one text that is almost right: found, then expected. It does not affect other criteria.
-_NEAR_MISS = re.compile(r'"; expected "')
+#: The names of the times in messages about a trial.
+_TIMES = frozenset({"answer", "next", "seconds", "start", "time"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +45,9 @@ class Excerpt:
 class Diagnosis:
     """The main explanation. ``cause`` and ``next_step`` are sentences; ``further`` are secondary causes.
 
-    ``lost`` has the indices of the criteria that lost marks by this cause. ``proof`` is what reruns showed, if there
-    were any, for ``proven``, the index of one of the criteria.
+    ``lost`` has the indices of the criteria that lost marks by this cause. ``fault`` is the fault that the cause
+    states, or None. ``proof`` is what reruns showed, if there were any, for ``proven``, the index of one of the
+    criteria.
     """
 
     cause: str
@@ -56,6 +55,7 @@ class Diagnosis:
     further: tuple[str, ...] = ()
     excerpt: Excerpt | None = None
     lost: frozenset[int] = frozenset()
+    fault: Fault | None = None
     proof: str = ""
     proven: int | None = None
 
@@ -69,7 +69,7 @@ def format_excerpt(diagnosis: Diagnosis) -> list[str]:
 def describe_outcome(grade: Grade, diagnosis: Diagnosis, language: Language = ENGLISH) -> str:
     """Describe how the grade's run ended and who caused it, without repeating the cause."""
     verdict_words = describe_grade(grade, language)
-    if verdict_words.happened in diagnosis.cause:
+    if verdict_words.happened == diagnosis.cause:
         return verdict_words.explanation
     return f"{verdict_words.happened} {verdict_words.explanation}".strip()
 
@@ -103,7 +103,7 @@ def _drop_refuted_hints(grade: Grade) -> Grade:
     if not losing_files or any(not cause.files for cause in grade.causes):
         return grade
     innocent_files = {*PART_FILES.values(), SECOND_PROGRAM} - losing_files
-    hints = (hint for hint in grade.hints if (place := _PLACE.match(hint)) is None or place[2] not in innocent_files)
+    hints = (hint for hint in grade.hints if (place := find_line(hint)) is None or place[0] not in innocent_files)
     return replace(grade, hints=tuple(hints))
 
 
@@ -148,8 +148,9 @@ def _diagnose_recorded_trials(grade: Grade, submission: Submission | None, langu
     if fault is not None and not has_waited_in_vain:
         return _diagnose_fault(grade, fault, failed_criteria, submission, language)
     if grade.missing:
-        affected_indices = (index for index, each in failed_criteria.items() if grade.missing in each.message)
-        return Diagnosis(verdict_words.happened, verdict_words.next_step, lost=frozenset(affected_indices))
+        missing_file = ("file", grade.missing)
+        affected_criteria = {i for i, each in failed_criteria.items() if missing_file in iterate_values(each.message)}
+        return Diagnosis(verdict_words.happened, verdict_words.next_step, lost=frozenset(affected_criteria))
     return (
         _diagnose_criterion(grade, failed_criteria, language)
         if failed_criteria
@@ -169,8 +170,8 @@ def _diagnose_full_marks(
         full=full_marks_text,
         difference=hints[0],
     )
-    place_match = _PLACE.match(grade.hints[0])
-    excerpt = _build_excerpt(submission, place_match[2], int(place_match[1])) if place_match is not None else None
+    place = find_line(grade.hints[0])
+    excerpt = None if place is None else _build_excerpt(submission, *place)
     step = language.say("No changes needed for the marks. Correct this if others use your program.")
     return Diagnosis(cause, step, hints[1:], excerpt)
 
@@ -183,27 +184,25 @@ def _diagnose_hint(
     language: Language,
 ) -> Diagnosis:
     hint = grade.hints[0]  # in English; ``hints`` are in the reader's language
-    fault = next((each for each in _iterate_faults(grade) if each.message[:200].rstrip(".") in hint), None)
+    fault = next((each for each in _iterate_faults(grade) if states_fault(hint, each)), None)
+    # A hint on one text that is almost right does not affect other criteria.
+    criteria = {value for name, value in iterate_values(hint) if name == "criterion"}
     if fault is not None:
         affected_criteria = _find_affected_criteria(grade, fault, failed_criteria)
-    elif _NEAR_MISS.search(hint):
-        texts = _QUOTED.findall(hint)
-        affected_criteria = frozenset(
-            index for index, each in failed_criteria.items() if any(text in each.message for text in texts)
-        )
     else:
-        affected_criteria = frozenset(index for index, each in failed_criteria.items() if not each.marks)
-    place_match = _PLACE.match(hint)
-    if place_match is None:
+        affected_criteria = frozenset(
+            index for index, each in failed_criteria.items() if (each.id in criteria if criteria else not each.marks)
+        )
+    place = find_line(hint)
+    if place is None:
         step = language.say("Fix this first, then submit again.")
-        return Diagnosis(hints[0], step, hints[1:], lost=affected_criteria)
-    line, name = int(place_match[1]), place_match[2]
+        return Diagnosis(hints[0], step, hints[1:], lost=affected_criteria, fault=fault)
+    name, line = place
     step = language.say(
-        "Fix line %(line)s of %(file)s, run it without submitting, then submit again.",
-        line=line,
-        file=name,
+        "Fix line %(line)s of %(file)s, run it without submitting, then submit again.", line=line, file=name
     )
-    return Diagnosis(hints[0], step, hints[1:], _build_excerpt(submission, name, line), lost=affected_criteria)
+    excerpt = _build_excerpt(submission, name, line)
+    return Diagnosis(hints[0], step, hints[1:], excerpt, lost=affected_criteria, fault=fault)
 
 
 def _diagnose_fault(
@@ -213,18 +212,17 @@ def _diagnose_fault(
     submission: Submission | None,
     language: Language,
 ) -> Diagnosis:
-    step = describe_grade(grade, language).next_step
+    affected_criteria = _find_affected_criteria(grade, fault, failed_criteria)
     if fault.verdict is Verdict.TIME_LIMIT:
         verdict_words = describe_verdict(fault.verdict, language)
-        return Diagnosis(
-            verdict_words.happened, verdict_words.next_step, lost=_find_affected_criteria(grade, fault, failed_criteria)
-        )
+        return Diagnosis(verdict_words.happened, verdict_words.next_step, lost=affected_criteria)
+    step = describe_grade(grade, language).next_step
     groups = group_faults(grade, submission, language=language)
     group = next(each for each in groups if each.message == to_display_text(fault.message, 600))
     hint = f" {group.hint}" if group.hint else ""
     cause = f"{group.where}: {group.message.rstrip('.')}.{hint}"
     excerpt = Excerpt(group.where, group.excerpt) if group.excerpt else None
-    return Diagnosis(cause, step, excerpt=excerpt, lost=_find_affected_criteria(grade, fault, failed_criteria))
+    return Diagnosis(cause, step, excerpt=excerpt, lost=affected_criteria, fault=fault)
 
 
 def _diagnose_criterion(grade: Grade, failed_criteria: dict[int, CriterionResult], language: Language) -> Diagnosis:
@@ -266,7 +264,7 @@ def describe_finding(grade: Grade, result: CriterionResult, language: Language =
     finding = to_display_text(failure.message, 600, lines=6)
     if failure.t is None:
         return finding
-    if not failure.t or f"{failure.t:.2f} s" in finding:
+    if not failure.t or any(name in _TIMES and value == failure.t for name, value in iterate_values(failure.message)):
         return finding + _describe_scenario(grade, failure, language)
     timed_finding = language.say("%(found)s, at %(seconds)s s.", found=finding.rstrip("."), seconds=f"{failure.t:.2f}")
     return timed_finding + _describe_scenario(grade, failure, language)
@@ -308,7 +306,7 @@ def _find_costly_fault(grade: Grade, failed_criteria: dict[int, CriterionResult]
         (
             fault
             for fault in _iterate_faults(grade)
-            if fault.verdict is not Verdict.TIME_LIMIT or any(fault.message in message for message in failure_messages)
+            if fault.verdict is not Verdict.TIME_LIMIT or any(states_fault(each, fault) for each in failure_messages)
         ),
         None,
     )
@@ -336,7 +334,7 @@ def _find_affected_criteria(grade: Grade, fault: Fault, failed_criteria: dict[in
 
 
 def _is_after_fault(evidence: Evidence, t: float, fault: Fault) -> bool:
-    return evidence.t is None or evidence.t >= t - 0.05 or fault.message in evidence.message
+    return evidence.t is None or evidence.t >= t - 0.05 or states_fault(evidence.message, fault)
 
 
 def _has_same_failure(grade: Grade, result: CriterionResult, other_result: CriterionResult) -> bool:

@@ -54,11 +54,11 @@ class FaultGroup:
     excerpt: tuple[SourceLine, ...] = ()
 
 
-def describe_other_faults(cause: str, grade: Grade) -> Iterator[tuple[str, FaultGroup]]:
-    """Yield each fault with its description, shortened to the place if the cause already has its message."""
+def describe_other_faults(stated_fault: Fault | None, grade: Grade) -> Iterator[tuple[str, FaultGroup]]:
+    """Yield each fault with its description, shortened to the place if it has the message of ``stated_fault``."""
+    stated_message = "" if stated_fault is None else to_display_text(stated_fault.message, 600)
     for group in group_faults(grade, limit=10):
-        is_in_cause = group.message.rstrip(".") in cause
-        yield (group.where if is_in_cause else f"{group.where}: {group.message}"), group
+        yield (group.where if group.message == stated_message else f"{group.where}: {group.message}"), group
 
 
 def group_faults(

@@ -40,8 +40,6 @@ from submissions.submission import Submission
 
 _log = logging.getLogger(__name__)
 
-#: The expected form of a submission, for rejections that don't state it.
-_EXPECTED_FORM = "robot.py and responder.py, or a notebook: side by side, in a folder or a .zip"
 _CSS_PIXELS = 100 / DPI
 _SAFE_IN_URIS = " !$'()*+,-./:;=?@_~"  # in a data URI that is a quoted attribute
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
@@ -208,15 +206,13 @@ def render_replay_section(document: bytes, language: Language = ENGLISH) -> Mark
 
 
 def render_refusal_page(row: TableRow[Grade]) -> str:
-    """Return the page of a rejected submission: what was found, what was expected, what to do next."""
-    finding, _, expected = row.reason.partition(", expected ")
+    """Return the page of a rejected submission: the reason, the expected form, and what to do next."""
     return render_page(
         "refusal.html",
         who=row.student.name or row.who,
         source=row.source,
         assignment=row.assignment,
-        found=f"{finding.rstrip('.')}.",
-        expected=f"{(expected or _EXPECTED_FORM).rstrip('.')}.",
+        reason=f"{row.reason.rstrip('.')}.",
     )
 
 

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from service.grading.grade import Accuracy, CriterionResult, Grade, TrialResult
+from service.grading.judging.message_parts import states_fault
 from service.grading.verdict_labels import VERDICT_LABELS
 from service.language import ENGLISH, Language, translatable
 from service.reports.display_text import format_decimal, to_display_text, to_one_line
@@ -249,7 +250,9 @@ def _is_verdict_advice_relevant(grade: Grade) -> bool:
     failure_messages = [each.message for one in grade.criteria if one.marks < one.max_marks for each in one.evidence]
     faults = (fault for trial in grade.trials for fault in collect_faults(trial.recording))
     return any(
-        fault.verdict is Verdict.TIME_LIMIT and fault.message in each for fault in faults for each in failure_messages
+        fault.verdict is Verdict.TIME_LIMIT and states_fault(each, fault)
+        for fault in faults
+        for each in failure_messages
     )
 
 

@@ -14,13 +14,12 @@ _ROOT = TESTS.parent
 _PACKAGES = ("models", "responders", "robomark", "service", "sim", "submissions")
 #: Programs of students and of the course, and migrations, which read the data of earlier releases.
 _LEFT_OUT = ("catalogue", "examples", "known_answer", "library", "template", "versions")
-_FIELDS = {"error", "hint", "message", "reason", "sentence", "staff_only"}
+_FIELDS = {"cause", "error", "finding", "hint", "happened", "message", "next_step", "reason", "sentence", "staff_only"}
 _NAMES = _FIELDS | {"note"}
 _PARTS = {"endswith", "find", "partition", "removeprefix", "removesuffix", "rpartition", "startswith"}
 _PATTERNS = {"findall", "finditer", "fullmatch", "match", "search"}
 
 _OF_PYTHON = "reads, for all hints, the sentences of Python, which has no codes for mistakes"
-_OF_REPORTS = "finds the hint, the fault and the evidence that say the same; stored grades have only their sentences"
 #: For each file, the number of such places and the reason.
 _ALLOWED: dict[str, tuple[int, str]] = {
     "responders/faults.py": (1, "reads, in one place, the sentence of a stored fault that it makes itself"),
@@ -28,22 +27,8 @@ _ALLOWED: dict[str, tuple[int, str]] = {
     "responders/sandbox/inside/name_suggestions.py": (2, "ImportError of Python's has no code for what is missing"),
     "service/commands/grading.py": (1, "leaves out of a row's reason the file's name, which the row has"),
     "service/grading/fault_kinds.py": (1, _OF_PYTHON),
-    "service/grading/hint_cause_lines.py": (1, "finds which of the program's own texts a message quotes"),
-    "service/store/grades/recordings.py": (
-        1,
-        "stored recordings name the parts that were left out only in their notes",
-    ),
-    "service/reports/diagnosis.py": (9, _OF_REPORTS),
-    "service/reports/html.py": (
-        1,
-        "lays out what was found and what was expected apart",
-    ),
     "sim/readers/json_text.py": (1, "Python's ValueError for a long number has no class of its own"),
     "submissions/assignment/reader.py": (1, "the TOML reader of Python 3.11 tells the line in its sentence alone"),
-    "submissions/assignment/table_problems.py": (
-        1,
-        "pydantic has no key for an error about a whole table",
-    ),
 }
 
 

@@ -41,7 +41,9 @@ def judge_finishes(criterion: Finishes, trial: TrialResult) -> Outcome:
     fault = find_ending_fault(recording)
     measures = (Measure(Sentence("time"), recording.end_t, "s"),)
     if fault is not None:
-        message = Sentence("Expected the program to end by itself, but %(end)s.", end=_describe_end(fault))
+        message = Sentence(
+            "Expected the program to end by itself, but %(end)s.", end=_describe_end(fault), fault=describe_fault(fault)
+        )
         outcome = fail_with(message, fault.t, recording.end, measures=measures, findings=(ReportedFault(fault),))
         return replace(outcome, has_end_reason=True)
     if criterion.seconds is not None and recording.end_t > criterion.seconds + 1e-9:

@@ -12,9 +12,10 @@ from service.grading.grade import TrialResult
 from service.grading.judging.outcome import Outcome, find_ending_fault
 from service.language import translatable
 from sim.recording import Fault, Verdict
-from sim.sentences import Sentence, join_sentences
+from sim.sentences import Sentence, find_opening, iterate_values, join_sentences
 
 _MAX_QUOTE_LENGTH = 80
+_LINE = translatable("line %(line)s of %(name)s")
 
 
 def quote_text(text: str) -> str:
@@ -38,6 +39,24 @@ def describe_fault(fault: Fault) -> str:
     """Return a fault as ``NameError: name 'x' is not defined (line 3)``."""
     position = f" ({fault.place})" if fault.place else ""
     return f"{fault.message.rstrip('.')}{position}"
+
+
+def states_fault(message: str, fault: Fault) -> bool:
+    """Return whether a message contains the description of the fault."""
+    return ("fault", describe_fault(fault)) in iterate_values(message)
+
+
+def describe_line(name: str, line: int) -> Sentence:
+    """Return a line of a file or cell as ``line 3 of robot.py``."""
+    return Sentence(_LINE, line=line, name=name)
+
+
+def find_line(message: str) -> tuple[str, int] | None:
+    """Return the name of the file or cell and the line with which a message begins; None if it begins otherwise."""
+    match find_opening(message, _LINE):
+        case Sentence(values={"name": name, "line": int(line)}):
+            return str(name), line
+    return None
 
 
 def describe_place(trial: TrialResult, t: float | None) -> str:

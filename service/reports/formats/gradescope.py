@@ -100,7 +100,7 @@ def _format_output(view: GradebookView, submission: Submission | None) -> str:
     lines = [f"Comment: {comment}" for comment in format_comments(grade)]
     lines += [diagnosis.cause, *format_excerpt(diagnosis), f"Next: {diagnosis.next_step}"]
     lines += [*diagnosis.further, describe_outcome(grade, diagnosis)]
-    for description, group in describe_other_faults(diagnosis.cause, grade):
+    for description, group in describe_other_faults(diagnosis.fault, grade):
         lines += [
             description,
             *([group.hint] if group.hint and description != group.where else []),

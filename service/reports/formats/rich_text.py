@@ -57,7 +57,7 @@ def render_rich_report(view: View, submission: Submission | None = None) -> Rend
         for index, proof in further_proofs.items()
     ]
     parts += [Text(further) for further in diagnosis.further]
-    parts += [_render_fault(told, group) for told, group in describe_other_faults(diagnosis.cause, grade)]
+    parts += [_render_fault(told, group) for told, group in describe_other_faults(diagnosis.fault, grade)]
     if grade.accuracy is not None:
         parts.append(Text(describe_accuracy(grade)))
     channel = describe_channel_losses(grade)

@@ -50,7 +50,7 @@ def render_plain_text(view: View, submission: Submission | None = None) -> str:
     lines += ["", *_wrap_text(describe_outcome(grade, diagnosis))]
     for cause in diagnosis.further:
         lines += ["", *_wrap_text(cause)]
-    for description, group in describe_other_faults(diagnosis.cause, grade):
+    for description, group in describe_other_faults(diagnosis.fault, grade):
         lines += ["", *_format_fault(description, group)]
     if grade.accuracy is not None:
         lines += ["", describe_accuracy(grade)]

@@ -24,7 +24,14 @@ GRADE_BYTES = 64_000_000
 #: Minimum size limit of one recording, regardless of their number.
 MIN_RECORDING_BYTES = 256_000
 _TEXT_KEPT = 2000
-_OMISSION_NOTE = "The recording was too large to be kept whole: "
+_NO_FLOODS, _NO_TEXTS, _NO_TICKS = (
+    f"The recording was too large to be kept whole: {omission}."
+    for omission in (
+        f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
+        "what was printed, said and sent is left out",
+        "its ticks are left out",
+    )
+)
 
 _Bytes = NDArray[np.uint8]
 
@@ -61,7 +68,7 @@ def encode_within_limit(recording: Recording, size_limit: int) -> StoredRecordin
 
 def is_whole(recording: Recording) -> bool:
     """Return whether a stored recording has all its parts."""
-    return not any(note.startswith(_OMISSION_NOTE) for note in recording.notes)
+    return {_NO_FLOODS, _NO_TEXTS, _NO_TICKS}.isdisjoint(recording.notes)
 
 
 def to_bytes(recording: Recording) -> bytes:
@@ -147,42 +154,42 @@ def _decode_column(data: _Bytes, column: Column) -> NDArray[Any]:
     return (values if column.width > 1 else values[:, 0]).copy()
 
 
-def _add_note(recording: Recording, omission: str) -> Recording:
-    return replace(recording, notes=(*recording.notes, f"{_OMISSION_NOTE}{omission}."))
-
-
 def _drop_floods(recording: Recording) -> Recording:
-    return _add_note(
-        replace(
-            recording,
-            images=(),
-            image_log=(),
-            calls=recording.calls[:_TEXT_KEPT],
-            printed=recording.printed[:_TEXT_KEPT],
-            datalog=recording.datalog[:_TEXT_KEPT],
-            messages=recording.messages[:_TEXT_KEPT],
-            agent_messages=recording.agent_messages[:_TEXT_KEPT],
-        ),
-        f"its images and the texts after the first {_TEXT_KEPT} of each kind are left out",
+    return replace(
+        recording,
+        images=(),
+        image_log=(),
+        calls=recording.calls[:_TEXT_KEPT],
+        printed=recording.printed[:_TEXT_KEPT],
+        datalog=recording.datalog[:_TEXT_KEPT],
+        messages=recording.messages[:_TEXT_KEPT],
+        agent_messages=recording.agent_messages[:_TEXT_KEPT],
+        notes=(*recording.notes, _NO_FLOODS),
     )
 
 
 def _drop_texts(recording: Recording) -> Recording:
-    emptied = replace(recording, calls=(), printed=(), spoken=(), datalog=(), messages=(), pen=(), touches=(), notes=())
     outputs = (
         replace(each, printed=each.printed[:_TEXT_KEPT], log=each.log[:_TEXT_KEPT]) for each in recording.agent_outputs
     )
-    shortened = replace(
-        emptied,
+    return replace(
+        recording,
+        calls=(),
+        printed=(),
+        spoken=(),
+        datalog=(),
+        messages=(),
+        pen=(),
+        touches=(),
+        notes=(_NO_TEXTS,),
         responder_output=recording.responder_output[:_TEXT_KEPT],
         responder_log=recording.responder_log[:_TEXT_KEPT],
         faults=recording.faults[:10],
         agent_messages=(),
         agent_outputs=tuple(outputs),
     )
-    return _add_note(shortened, "what was printed, said and sent is left out")
 
 
 def _drop_ticks(recording: Recording) -> Recording:
     ticks = Ticks(**cast(dict[str, Any], {"x": np.empty(0), **_encode_tick_totals(recording.ticks)}))
-    return _add_note(replace(recording, ticks=ticks), "its ticks are left out")
+    return replace(recording, ticks=ticks, notes=(*recording.notes, _NO_TICKS))

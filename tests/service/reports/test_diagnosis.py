@@ -14,6 +14,7 @@ from rich.console import Console
 
 import report_builders as build
 from service.grading.grade import CriterionResult, Evidence, Grade, StaffAdjustment
+from service.grading.judging.message_parts import describe_line
 from service.reports.diagnosis import diagnose
 from service.reports.formats.gradescope import build_gradescope_document
 from service.reports.formats.json_output import build_json_document
@@ -25,9 +26,16 @@ from service.reports.page import build_page
 from service.reports.verdict_sentences import FULL_MARKS, describe_verdict
 from service.reports.view import build_gradebook_view, build_staff_view, build_student_view
 from sim.recording import Fault, Verdict
+from sim.sentences import Sentence
 
 ERROR = "NameError: name 'pasrer' is not defined"
-HINT = f"line 2 of responder.py: {ERROR}. Did you mean parser?"
+FAULT = f"{ERROR} (line 2)"
+HINT = Sentence(
+    "%(place)s: %(problem)s. Did you mean parser?",
+    place=describe_line("responder.py", 2),
+    problem=ERROR,
+    fault=FAULT,
+)
 
 
 def criterion(name: str, *evidence: Evidence, marks: int = 0, message: str = "It went otherwise.") -> CriterionResult:
@@ -60,7 +68,10 @@ def test_a_hint_is_the_cause_and_its_line_the_excerpt_and_the_next_step() -> Non
         ((missed(1, None),), True),
         ((missed(1, 9.0),), True),
         ((missed(1, 0.0),), False),  # before the error
-        ((missed(1, 0.0, f"no answer: {ERROR} (line 2)"),), True),  # yet caused by it, as its message says
+        (
+            (missed(1, 0.0, Sentence("no answer: %(fault)s", fault=FAULT)),),
+            True,
+        ),  # yet caused by it
         ((missed(0, None),), False),  # in a trial without it
         ((missed(0, None), missed(1, None)), False),
         ((), False),
@@ -77,7 +88,9 @@ def test_what_comes_after_an_error_where_it_came_is_lost_through_it(
 def test_a_text_that_is_nearly_right_costs_only_what_asks_for_it() -> None:
     says = criterion("says", message='Expected "all done" at the end, but it said "all donne".')
     drives = criterion("drives", message="Expected the robot to drive 300 mm.")
-    hint = 'line 8 of robot.py says "all donne"; expected "all done"'
+    hint = Sentence(
+        'line 8 of robot.py says "all donne"; expected %(expected)s', expected='"all done"', criterion="says"
+    )
     grade = replace(build.line_follower_grade(), hints=(hint,), criteria=(drives, says))
     assert diagnose(grade).lost == {1}
 
@@ -99,7 +112,8 @@ def test_time_that_was_up_is_the_cause_only_where_it_cost_marks() -> None:
     grade = build.line_follower_grade()
     recording = replace(grade.trials[0].recording, faults=(Fault(10.0, Verdict.TIME_LIMIT, "program", words),))
     ended = replace(grade, trials=(replace(grade.trials[0], recording=recording),))
-    cost = replace(ended, criteria=(criterion("ends", missed(0, 10.0, f"Expected an end, but {words}.")),))
+    message = Sentence("Expected an end, but %(fault)s.", fault=words)
+    cost = replace(ended, criteria=(criterion("ends", missed(0, 10.0, message)),))
     other = replace(ended, criteria=(criterion("line", missed(0, 1.5, "Expected 65 mm, but it was 72 mm off.")),))
     assert diagnose(cost).cause == "Your program was still running at the end of the simulated time."
     assert diagnose(other).cause == "Expected 65 mm, but it was 72 mm off, at 1.50 s."
@@ -115,8 +129,8 @@ def test_a_missing_part_comes_before_the_time_that_was_up_for_want_of_it() -> No
         missing="responder.py",
         trials=(replace(grade.trials[0], recording=recording), *grade.trials[1:]),
         criteria=(
-            criterion("ends", missed(0, 10.0, words)),
-            criterion("names", missed(0, None), message="There is no responder.py."),
+            criterion("ends", missed(0, 10.0, Sentence("%(fault)s.", fault=words))),
+            criterion("names", missed(0, None), message=Sentence("There is no %(file)s.", file="responder.py")),
         ),
     )
     diagnosis = diagnose(graded)

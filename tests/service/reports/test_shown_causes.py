@@ -9,6 +9,7 @@ import pytest
 
 from report_builders import line_follower_grade
 from service.grading.grade import Grade, ShownCause
+from service.grading.judging.message_parts import describe_line
 from service.language import load_language
 from service.reports.diagnosis import diagnose
 from service.reports.formats.json_output import build_json_document
@@ -71,7 +72,8 @@ def test_causes_are_translated() -> None:
 
 
 def test_hints_about_a_part_that_loses_nothing_are_dropped() -> None:
-    hints = ("Line 3 of responder.py: something.", "Line 4 of robot.py: something else.")
+    places = (describe_line("responder.py", 3), describe_line("robot.py", 4))
+    hints = tuple(Sentence("%(place)s: something.", place=place) for place in places)
     grade = replace(lost(), hints=hints)
     assert diagnose(grade).cause.startswith("Line 3 of responder.py")
     assert diagnose(with_cause(grade, files=("robot.py",))).cause.startswith("Line 4 of robot.py")
