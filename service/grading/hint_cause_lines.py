@@ -15,7 +15,7 @@ from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
 from service.grading.hint_texts import describe_quoting_line
-from service.grading.judging.message_parts import quote_text
+from service.grading.judging.message_parts import find_line, quote_text
 from sim.sentences import Sentence, iterate_values, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.code import Functions
@@ -81,4 +81,4 @@ def _describe_cause_line(criterion: Criterion, message: str, clues: Clues) -> st
         ]
     else:
         return ""
-    return locations[0] if len(locations) == 1 and locations[0].startswith("line ") else ""
+    return locations[0] if len(locations) == 1 and find_line(locations[0]) is not None else ""
