@@ -1,18 +1,19 @@
-"""Upgrade of a database's tables to this release, exactly once with any number of concurrent processes.
+"""Creation of a database's tables, and their upgrade to this release, once with any number of concurrent processes.
 
 Downgrades are not supported: an older Robomark rejects a newer database.
 """
 
 from __future__ import annotations
 
+import secrets
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sqlalchemy import Engine, text
+from sqlalchemy import Engine, delete, insert, inspect, text
 from sqlalchemy.engine import Connection
 
-from service.store import new_database
-from service.store.revision import find_newest_revision, read_revision
+from service.store.revision import OLDEST_COMPATIBLE, find_newest_revision, read_revision
 from sim.errors import HostError
 
 if TYPE_CHECKING:
@@ -49,10 +50,29 @@ def upgrade_database(engine: Engine) -> None:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
         if read_revision(connection) == find_newest_revision():
             return
-        if new_database.is_empty_sqlite(connection):
-            new_database.create_tables(connection, find_newest_revision())
+        if is_empty_sqlite(connection):
+            create_tables(connection)
         else:
             apply_migrations(connection)
+
+
+def is_empty_sqlite(connection: Connection) -> bool:
+    """Return whether this is an empty SQLite database."""
+    return connection.dialect.name == "sqlite" and not inspect(connection).get_table_names()
+
+
+def create_tables(connection: Connection) -> None:
+    """Create all tables of an empty SQLite database, which is faster than one migration after another."""
+    # Imported only for a new database: read-only commands do not need the tables.
+    from service.store.tables import METADATA
+    from service.store.tables.installation import Installation
+
+    METADATA.create_all(connection, checkfirst=False)
+    values = {"id": 1, "secret": secrets.token_hex(32), "made_at": datetime.now(UTC)}
+    connection.execute(insert(Installation).values(values))
+    connection.exec_driver_sql("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)")
+    connection.exec_driver_sql("INSERT INTO alembic_version VALUES (?)", (find_newest_revision(),))
+    _record_compatibility(connection)
 
 
 def apply_migrations(connection: Connection) -> None:
@@ -69,3 +89,11 @@ def apply_migrations(connection: Connection) -> None:
             "upgrade this Robomark, or restore a backup: there is no way down."
         )
     command.upgrade(config, "head")
+    _record_compatibility(connection)
+
+
+def _record_compatibility(connection: Connection) -> None:
+    from service.store.tables.installation import SchemaCompatibility
+
+    connection.execute(delete(SchemaCompatibility))
+    connection.execute(insert(SchemaCompatibility).values(id=1, oldest_compatible=OLDEST_COMPATIBLE))

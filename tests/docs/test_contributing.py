@@ -90,12 +90,10 @@ with open_store(Settings(home=home)) as store:
 import tempfile
 from alembic import command
 from service.settings import Settings
-from service.store import recorded_schema
 from service.store.engine import open_engine, open_store
 from service.store.migrate import build_alembic_config, apply_migrations
 from service.store.tables import METADATA
 assert "batch_note" in METADATA.tables
-recorded_schema.write_schema()
 engine = open_engine(f"sqlite:///{tempfile.mkdtemp()}/new.db")
 with engine.begin() as connection:
     apply_migrations(connection)

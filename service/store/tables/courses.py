@@ -80,7 +80,7 @@ class Policy(Base):
     late_days: Mapped[int] = mapped_column(default=0)
     attempts: Mapped[int | None]
     cool_down_seconds: Mapped[float] = mapped_column(default=0.0)
-    zone: Mapped[str] = mapped_column(String(64), default="")  # zone of late days; empty: the server's
+    zone: Mapped[str] = mapped_column(String(64), default="", server_default="")  # of late days; empty: the server's
 
 
 class Extension(Base):

@@ -33,8 +33,8 @@ class TrialRow(Base):
     verdict: Mapped[str] = mapped_column(String(32))
     sha256: Mapped[str] = mapped_column(String(64))
     end_t: Mapped[float]
-    place: Mapped[int] = mapped_column(default=0)  # index of the pose in the scenario
-    sweep: Mapped[Any] = mapped_column(default=list)  # [["light_noise", 32.0]]: swept values and their levels here
+    place: Mapped[int] = mapped_column(default=0, server_default="0")  # index of the pose in the scenario
+    sweep: Mapped[Any] = mapped_column(default=list, server_default="[]")  # [["light_noise", 32.0]]: swept levels here
     surprise: Mapped[str | None]  # an error in Robomark's own code, if one occurred
 
 
@@ -62,11 +62,11 @@ class CriterionResultRow(Base):
     confusion: Mapped[Any | None]  # [[truth, answer or null, count], ...]
     counts: Mapped[Any | None]  # {"sent": 6, "answered": 5, "late": 0, "malformed": 0, "unanswered": 1, ...}
     confidence: Mapped[Any | None]  # {"right": 0.93, "n_right": 5, "wrong": null, "n_wrong": 0}
-    curves: Mapped[Any] = mapped_column(default=list)  # [{"along": "light_noise", "levels": [...]}, ...]
+    curves: Mapped[Any] = mapped_column(default=list, server_default="[]")  # [{"along": ..., "levels": [...]}, ...]
     unjudged: Mapped[str | None]  # why it could not be judged; needs review by staff
     predictions: Mapped[Any]
     shown: Mapped[Any | None]  # {"message": ..., "accuracy": ..., "curves": ...} of the visible trials only
-    for_staff: Mapped[str] = mapped_column(default="")  # hint for a review by staff; never shown to students
+    for_staff: Mapped[str] = mapped_column(default="", server_default="")  # for a review by staff; not for students
     pool: Mapped[Any | None]  # {"size": 200, "drawn": 24, "least": 0.62, "most": 0.9, "is_decided": true}
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ForeignKey, Index, String
+from sqlalchemy import ForeignKey, Index, String, false
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
@@ -23,7 +23,7 @@ class Person(Base):
     __tablename__ = "person"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    operator: Mapped[bool] = mapped_column(default=False)  # administers the whole installation
+    operator: Mapped[bool] = mapped_column(default=False, server_default=false())  # administers the whole installation
     created_at: Mapped[datetime]
     signed_in_at: Mapped[datetime | None]  # or got a token, first; from then on no platform may replace them
 
@@ -38,7 +38,7 @@ class Enrolment(Base):
     course_id: Mapped[int] = mapped_column(ForeignKey("course.id"))
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"))
     student: Mapped[str]  # the id, in its normal form
-    written: Mapped[str]  # the id as it was first written
+    written: Mapped[str] = mapped_column(server_default="")  # the id as it was first written
     role: Mapped[Role]
     name: Mapped[str] = mapped_column(default="", server_default="")
     email: Mapped[str] = mapped_column(default="", server_default="")

@@ -9,7 +9,7 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import CheckConstraint, ForeignKey, Index, LargeBinary, String, text
+from sqlalchemy import CheckConstraint, ForeignKey, Index, LargeBinary, String, false, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
@@ -52,7 +52,7 @@ class SubmissionRow(Base):
     packed: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
     created_at: Mapped[datetime]
     submitted_at: Mapped[datetime | None]  # by the student; None if unknown
-    days_late: Mapped[int] = mapped_column(default=0)
+    days_late: Mapped[int] = mapped_column(default=0, server_default="0")
     staff_only: Mapped[str | None]  # the limit that it exceeds: the submission is marked, but only staff see it
     exceeded: Mapped[Any | None]  # the same limit as data: {"limit": "attempts", "actual": 3, "allowed": 2}
 
@@ -124,23 +124,25 @@ class Job(Base):
     grader_version: Mapped[str | None]
     sandbox: Mapped[str | None]
     notes: Mapped[Any] = mapped_column(default=list)
-    hints: Mapped[Any] = mapped_column(default=list)  # sentences on the probable causes of lost marks
+    hints: Mapped[Any] = mapped_column(default=list, server_default="[]")  # on the probable causes of lost marks
     #: [["template", {"name": value}], ...]: those texts of the grade that can be translated.
-    sentences: Mapped[Any] = mapped_column(default=list, deferred=True)
-    missing: Mapped[str] = mapped_column(default="")  # the required part that was not submitted
-    whole_pools: Mapped[bool] = mapped_column(default=False)  # run all trials of pools, not only the first
-    provisional: Mapped[bool] = mapped_column(default=False)  # its marks depend on a pool that was not run completely
+    sentences: Mapped[Any] = mapped_column(default=list, server_default="[]", deferred=True)
+    missing: Mapped[str] = mapped_column(default="", server_default="")  # the required part that was not submitted
+    #: Run all trials of pools, not only the first.
+    whole_pools: Mapped[bool] = mapped_column(default=False, server_default=false())
+    #: Its marks depend on a pool that was not run completely.
+    provisional: Mapped[bool] = mapped_column(default=False, server_default=false())
     cost: Mapped[Any | None]  # {"limits": {"cpu_seconds": 240.0, ...}, "spent": {"cpu_seconds": 3.2, ...}}
 
     #: Times of one grading, ISO 8601 UTC, by the names in ``phases``.
-    phases: Mapped[Any] = mapped_column(default=dict)
+    phases: Mapped[Any] = mapped_column(default=dict, server_default="{}")
     grader_sha256: Mapped[str | None] = mapped_column(String(64))  # of all code that affects marks
     secret_sha256: Mapped[str | None] = mapped_column(String(64))  # of the secret that its seeds use; None: no secret
     cache_key: Mapped[str | None] = mapped_column(String(64), index=True)  # equal only if the grades must be equal
-    forced: Mapped[bool] = mapped_column(default=False)  # run it even if an identical grade exists
+    forced: Mapped[bool] = mapped_column(default=False, server_default=false())  # run even if an identical grade exists
     copied_from: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the original grade
     regrade_of: Mapped[str | None] = mapped_column(ForeignKey("job.id"), index=True)  # the previous standing grade
-    standing: Mapped[Standing] = mapped_column(default=Standing.STANDS)
+    standing: Mapped[Standing] = mapped_column(default=Standing.STANDS, server_default=Standing.STANDS.value)
     suspect: Mapped[str | None]  # why its grade is not trusted
     published_at: Mapped[datetime | None]
     published_by: Mapped[str | None]

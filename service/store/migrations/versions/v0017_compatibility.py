@@ -15,7 +15,6 @@ revision = "0017"
 down_revision = "0016"
 branch_labels = None
 depends_on = None
-OLDEST_COMPATIBLE = "0017"
 
 
 def upgrade() -> None:

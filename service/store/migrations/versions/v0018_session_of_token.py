@@ -13,7 +13,6 @@ revision = "0018"
 down_revision = "0017"
 branch_labels = None
 depends_on = None
-OLDEST_COMPATIBLE = "0017"
 
 
 def upgrade() -> None:

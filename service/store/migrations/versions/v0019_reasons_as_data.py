@@ -18,7 +18,6 @@ down_revision = "0018"
 branch_labels = None
 depends_on = None
 # Older code writes only the sentence.
-OLDEST_COMPATIBLE = "0019"
 
 _SUBMISSION = sa.table(
     "submission", sa.column("id", sa.Integer), sa.column("staff_only", SafeText()), sa.column("exceeded", SafeJson())

@@ -11,7 +11,6 @@ revision = "0020"
 down_revision = "0019"
 branch_labels = None
 depends_on = None
-OLDEST_COMPATIBLE = "0019"
 
 _IS_QUEUED = sa.text("state = 'queued'")
 

@@ -13,7 +13,6 @@ down_revision = "0020"
 branch_labels = None
 depends_on = None
 # Older code stores English texts only.
-OLDEST_COMPATIBLE = "0019"
 
 
 def upgrade() -> None:

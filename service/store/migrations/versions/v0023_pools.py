@@ -13,7 +13,6 @@ down_revision = "0022"
 branch_labels = None
 depends_on = None
 # Older code grades with all trials, and ignores the queue of completions.
-OLDEST_COMPATIBLE = "0019"
 
 
 def upgrade() -> None:

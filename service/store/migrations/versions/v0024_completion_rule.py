@@ -11,7 +11,6 @@ revision = "0024"
 down_revision = "0023"
 branch_labels = None
 depends_on = None
-OLDEST_COMPATIBLE = "0019"
 
 
 def upgrade() -> None:

@@ -13,7 +13,6 @@ down_revision = "0024"
 branch_labels = None
 depends_on = None
 # Older code publishes grades without statements; ``robomark log check`` names them.
-OLDEST_COMPATIBLE = "0019"
 
 
 def upgrade() -> None:
