@@ -10,8 +10,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0001"
 down_revision = None
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

@@ -8,8 +8,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0002"
 down_revision = "0001"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

@@ -8,8 +8,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0008"
 down_revision = "0007"
-branch_labels = None
-depends_on = None
 
 _TABLES = {"canary": "self_test", "presence": "heartbeat"}
 _COLUMNS = (

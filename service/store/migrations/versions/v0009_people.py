@@ -14,8 +14,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0009"
 down_revision = "0008"
-branch_labels = None
-depends_on = None
 
 _BATCH = sa.table("batch", sa.column("id", sa.String), sa.column("refusals", SafeJson()))
 _NOBODY = {"id": "", "name": "", "email": ""}

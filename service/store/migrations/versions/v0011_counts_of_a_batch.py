@@ -8,8 +8,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0011"
 down_revision = "0010"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

@@ -13,8 +13,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0012"
 down_revision = "0011"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

@@ -16,8 +16,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0013"
 down_revision = "0012"
-branch_labels = None
-depends_on = None
 
 _OPENED = sa.table(
     "open_assignment",

@@ -14,8 +14,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0015"
 down_revision = "0013"
-branch_labels = None
-depends_on = None
 
 _JOB = sa.table(
     "job",

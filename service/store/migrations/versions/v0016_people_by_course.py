@@ -15,8 +15,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0016"
 down_revision = "0015"
-branch_labels = None
-depends_on = None
 
 _PERSON = sa.table(
     "person",

@@ -13,8 +13,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0017"
 down_revision = "0016"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

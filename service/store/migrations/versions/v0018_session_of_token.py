@@ -11,8 +11,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0018"
 down_revision = "0017"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

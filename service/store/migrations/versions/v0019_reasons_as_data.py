@@ -15,9 +15,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0019"
 down_revision = "0018"
-branch_labels = None
-depends_on = None
-# Older code writes only the sentence.
 
 _SUBMISSION = sa.table(
     "submission", sa.column("id", sa.Integer), sa.column("staff_only", SafeText()), sa.column("exceeded", SafeJson())

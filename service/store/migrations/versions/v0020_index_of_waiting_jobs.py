@@ -9,8 +9,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0020"
 down_revision = "0019"
-branch_labels = None
-depends_on = None
 
 _IS_QUEUED = sa.text("state = 'queued'")
 

@@ -10,9 +10,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0021"
 down_revision = "0020"
-branch_labels = None
-depends_on = None
-# Older code stores English texts only.
 
 
 def upgrade() -> None:

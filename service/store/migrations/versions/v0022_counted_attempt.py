@@ -9,8 +9,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0022"
 down_revision = "0021"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

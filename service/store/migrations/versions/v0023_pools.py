@@ -10,9 +10,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0023"
 down_revision = "0022"
-branch_labels = None
-depends_on = None
-# Older code grades with all trials, and ignores the queue of completions.
 
 
 def upgrade() -> None:

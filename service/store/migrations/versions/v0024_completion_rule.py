@@ -9,8 +9,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0024"
 down_revision = "0023"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:

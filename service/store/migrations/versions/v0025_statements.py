@@ -10,9 +10,6 @@ from service.store.migrate import refuse_downgrade
 
 revision = "0025"
 down_revision = "0024"
-branch_labels = None
-depends_on = None
-# Older code publishes grades without statements; ``robomark log check`` names them.
 
 
 def upgrade() -> None:
