@@ -1,4 +1,4 @@
-"""Hints on what is accepted although it differs from the description: other words, or missing keys.
+"""Hints on what is accepted although it differs from the description: other words, missing keys, a called responder.
 
 They apply with full marks as well.
 """
@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from responders.message_format import JSON
-from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues
+from service.grading.hint_clues import MAX_TEXT_LENGTH, Clues, find_listing
 from service.grading.hint_formats import RETURN_LINE, describe_return_line
 from service.grading.hint_texts import ExpectedText, describe_quoting_line, is_near
 from service.grading.judging.message_parts import quote_text
@@ -64,6 +64,25 @@ def hint_about_missing_keys(clues: Clues) -> Iterator[str]:
             answer=quote_text(answers[0]),
             keys=join_with_and([quote_text(key) for key in missing_keys[:3]]),
         )
+
+
+def hint_about_called_responder(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``roboSim.pyresponder = responder()``, which failed in its cell."""
+    for fault in clues.cell_errors:
+        listing = find_listing(fault, clues)
+        statement = listing.code.find_statement(fault.line) if listing is not None else None
+        if listing is None or statement is None or statement.tokens[:4] != ("roboSim", ".", "pyresponder", "="):
+            continue
+        call = next((each for each in statement.calls if each.name == statement.tokens[4]), None)
+        if call is not None:
+            yield Sentence(
+                "%(place)s calls %(name)s, which failed: %(failure)s. Write it without brackets: "
+                "roboSim.pyresponder = %(name)s",
+                place=listing.locate(statement.line),
+                name=call.name,
+                failure=fault.message.rstrip("."),
+            )
+            return
 
 
 def _join_task_lines(clues: Clues) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from responders.message_format import JSON
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
-from service.grading.hint_clues import Clues, Listing, find_listing
+from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_files import hint_about_redefined_functions
 from service.grading.hint_formats import describe_return_line, hint_about_answers
@@ -134,25 +134,6 @@ def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
                         name=statement.tokens[4],
                     )
                     return
-
-
-def hint_about_called_responder(clues: Clues) -> Iterator[str]:
-    """Yield a hint on ``roboSim.pyresponder = responder()``, which failed in its cell."""
-    for fault in clues.cell_errors:
-        listing = find_listing(fault, clues)
-        statement = listing.code.find_statement(fault.line) if listing is not None else None
-        if listing is None or statement is None or statement.tokens[:4] != ("roboSim", ".", "pyresponder", "="):
-            continue
-        call = next((each for each in statement.calls if each.name == statement.tokens[4]), None)
-        if call is not None:
-            yield Sentence(
-                "%(place)s calls %(name)s, which failed: %(failure)s. Write it without brackets: "
-                "roboSim.pyresponder = %(name)s",
-                place=listing.locate(statement.line),
-                name=call.name,
-                failure=fault.message.rstrip("."),
-            )
-            return
 
 
 def hint_about_unreturned_answers(clues: Clues) -> Iterator[str]:

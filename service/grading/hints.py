@@ -10,142 +10,40 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 
+from service.grading import (
+    hint_accepted,
+    hint_agents,
+    hint_answer_forms,
+    hint_answers,
+    hint_braces,
+    hint_cause_lines,
+    hint_counterfactuals,
+    hint_errors,
+    hint_failure_lines,
+    hint_files,
+    hint_formats,
+    hint_formulas,
+    hint_functions,
+    hint_logic,
+    hint_loops,
+    hint_motion,
+    hint_outputs,
+    hint_passes,
+    hint_recognition,
+    hint_repetition,
+    hint_responder,
+    hint_scale,
+    hint_signatures,
+    hint_skipped_loops,
+    hint_slips,
+    hint_structure,
+    hint_texts,
+    hint_thresholds,
+    hint_timing,
+    hint_values,
+)
 from service.grading.grade import CriterionResult, TrialResult
-from service.grading.hint_accepted import hint_about_missing_keys, hint_about_other_words
-from service.grading.hint_agents import hint_about_silent_agent, hint_about_text_of_agent, hint_about_unasked_agent
-from service.grading.hint_answer_forms import hint_about_missing_frame, hint_about_quoted_values
-from service.grading.hint_answers import (
-    hint_about_answer_values,
-    hint_about_image_command,
-    hint_about_missing_key,
-    hint_about_none_answers,
-    hint_about_other_keys,
-    hint_about_quoted_object,
-    hint_about_returned_pair,
-    hint_about_shifted_numbers,
-    hint_about_swapped_values,
-    hint_about_text_numbers,
-)
-from service.grading.hint_braces import hint_about_braces
-from service.grading.hint_cause_lines import hint_about_cause_line
 from service.grading.hint_clues import Clues, collect_clues
-from service.grading.hint_counterfactuals import hint_about_wrong_number
-from service.grading.hint_errors import hint_about_cell_errors, hint_about_errors, hint_about_failed_cell
-from service.grading.hint_failure_lines import hint_about_failure_line, hint_about_unentered_loop
-from service.grading.hint_files import (
-    hint_about_ignored_magic,
-    hint_about_redefined_functions,
-    hint_about_several_programs,
-    hint_about_starter_files,
-    hint_about_swapped_parts,
-)
-from service.grading.hint_formats import (
-    hint_about_answers,
-    hint_about_empty_parts,
-    hint_about_image_log,
-    hint_about_images,
-    hint_about_magics,
-    hint_about_messages,
-    hint_about_missing_files,
-    hint_about_quoted_names,
-)
-from service.grading.hint_formulas import (
-    hint_about_division,
-    hint_about_gain,
-    hint_about_gyro_direction,
-    hint_about_radius,
-    hint_about_reversed_distance,
-)
-from service.grading.hint_functions import (
-    hint_about_functions,
-    hint_about_hidden_prefix,
-    hint_about_missing_return,
-    hint_about_narrow_except,
-    hint_about_returned_values,
-)
-from service.grading.hint_logic import (
-    hint_about_first_message,
-    hint_about_first_value,
-    hint_about_large_step,
-    hint_about_mirrored_end,
-    hint_about_missing_reverse,
-    hint_about_range_start,
-    hint_about_range_step,
-    hint_about_spoken_name,
-    hint_about_unused_parameter,
-)
-from service.grading.hint_loops import hint_about_limits
-from service.grading.hint_motion import (
-    hint_about_curves,
-    hint_about_distances,
-    hint_about_missing_turn,
-    hint_about_raw_light,
-    hint_about_speeds,
-    hint_about_stillness,
-    hint_about_turns,
-    hint_about_units,
-)
-from service.grading.hint_outputs import hint_about_missing_else, hint_about_printed_object, hint_about_swapped_sides
-from service.grading.hint_passes import (
-    hint_about_added_factor,
-    hint_about_hasty_resending,
-    hint_about_kept_value,
-    hint_about_short_loop,
-    hint_about_stale_twin,
-    hint_about_zero_pass,
-)
-from service.grading.hint_recognition import hint_about_pixel_step, hint_about_recognition
-from service.grading.hint_repetition import (
-    hint_about_early_output,
-    hint_about_exact_reading,
-    hint_about_inner_loop,
-    hint_about_last_number,
-    hint_about_repeated_words,
-    hint_about_single_reaction,
-)
-from service.grading.hint_responder import (
-    hint_about_called_responder,
-    hint_about_double_json,
-    hint_about_misnamed_function,
-    hint_about_missing_responder,
-    hint_about_single_colon,
-    hint_about_uncallable_responder,
-    hint_about_unqueued_answers,
-    hint_about_unreadable_answers,
-    hint_about_unreturned_answers,
-    hint_about_wrong_prefix,
-)
-from service.grading.hint_scale import hint_about_raw_report, hint_about_wrong_scale
-from service.grading.hint_signatures import hint_about_signatures
-from service.grading.hint_skipped_loops import hint_about_skipped_loop
-from service.grading.hint_slips import hint_about_missing_comma, hint_about_slips
-from service.grading.hint_structure import (
-    hint_about_discarded_value,
-    hint_about_missing_brackets,
-    hint_about_output_below_loop,
-    hint_about_replaced_function,
-    hint_about_single_reading,
-    hint_about_stop_in_loop,
-    hint_about_uncalled_function,
-    hint_about_unindented_statement,
-)
-from service.grading.hint_texts import (
-    hint_about_missing_series,
-    hint_about_sent_texts,
-    hint_about_texts,
-    hint_about_unspoken_text,
-)
-from service.grading.hint_thresholds import hint_about_joined_colours, hint_about_thresholds
-from service.grading.hint_timing import hint_about_overlapping_speech, hint_about_rare_readings, hint_about_short_waits
-from service.grading.hint_values import (
-    hint_about_few_images,
-    hint_about_few_samples,
-    hint_about_partial_reading,
-    hint_about_swallowed_flags,
-    hint_about_swapped_atan2,
-    hint_about_swapped_ports,
-    hint_about_unused_value,
-)
 from service.grading.judging.limited_judging import collect_within_limits
 from service.grading.run_plan import RunPlan
 from submissions.submission import Submission
@@ -156,136 +54,146 @@ _MAX_HINTS = 5
 Rule = Callable[[Clues], Iterator[str]]
 #: Problems that prevent everything else.
 _FILE_RULES: Sequence[Rule] = (
-    hint_about_missing_files,
-    hint_about_empty_parts,
-    hint_about_starter_files,
-    hint_about_swapped_parts,
+    hint_formats.hint_about_missing_files,
+    hint_formats.hint_about_empty_parts,
+    hint_files.hint_about_starter_files,
+    hint_files.hint_about_swapped_parts,
 )
 #: Rules that explain an error better than its message. The message is used if none of them applies.
 _ERROR_RULES: Sequence[Rule] = (
-    hint_about_magics,
-    hint_about_cell_errors,
-    hint_about_misnamed_function,
-    hint_about_missing_responder,
-    hint_about_uncallable_responder,
-    hint_about_unreturned_answers,
-    hint_about_unreadable_answers,
-    hint_about_missing_return,
-    hint_about_missing_key,
-    hint_about_unqueued_answers,
-    hint_about_signatures,
-    hint_about_missing_comma,
+    hint_formats.hint_about_magics,
+    hint_errors.hint_about_cell_errors,
+    hint_responder.hint_about_misnamed_function,
+    hint_responder.hint_about_missing_responder,
+    hint_responder.hint_about_uncallable_responder,
+    hint_responder.hint_about_unreturned_answers,
+    hint_responder.hint_about_unreadable_answers,
+    hint_functions.hint_about_missing_return,
+    hint_answers.hint_about_missing_key,
+    hint_responder.hint_about_unqueued_answers,
+    hint_signatures.hint_about_signatures,
+    hint_slips.hint_about_missing_comma,
 )
 #: Rules for the causes of errors.
 _MESSAGE_RULES: Sequence[Rule] = (
-    hint_about_messages,
-    hint_about_quoted_names,
-    hint_about_braces,
-    hint_about_images,
-    hint_about_image_log,
-    hint_about_double_json,
-    hint_about_single_colon,
-    hint_about_wrong_prefix,
-    hint_about_answers,
-    hint_about_sent_texts,
-    hint_about_other_keys,
-    hint_about_text_numbers,
+    hint_formats.hint_about_messages,
+    hint_formats.hint_about_quoted_names,
+    hint_braces.hint_about_braces,
+    hint_formats.hint_about_images,
+    hint_formats.hint_about_image_log,
+    hint_responder.hint_about_double_json,
+    hint_responder.hint_about_single_colon,
+    hint_responder.hint_about_wrong_prefix,
+    hint_formats.hint_about_answers,
+    hint_texts.hint_about_sent_texts,
+    hint_answers.hint_about_other_keys,
+    hint_answers.hint_about_text_numbers,
 )
 #: Rules for programs that ran into a limit.
-_LIMIT_RULES: Sequence[Rule] = (hint_about_stop_in_loop, hint_about_gyro_direction, hint_about_limits)
+_LIMIT_RULES: Sequence[Rule] = (
+    hint_structure.hint_about_stop_in_loop,
+    hint_formulas.hint_about_gyro_direction,
+    hint_loops.hint_about_limits,
+)
 #: Rules for programs that finished but did too little, the most certain first.
 _STRUCTURE_RULES: Sequence[Rule] = (
-    hint_about_ignored_magic,
-    hint_about_missing_brackets,
-    hint_about_replaced_function,
-    hint_about_redefined_functions,
-    hint_about_uncalled_function,
-    hint_about_single_reading,
-    hint_about_skipped_loop,
-    hint_about_discarded_value,
-    hint_about_unindented_statement,
-    hint_about_output_below_loop,
-    hint_about_stale_twin,
-    hint_about_kept_value,
+    hint_files.hint_about_ignored_magic,
+    hint_structure.hint_about_missing_brackets,
+    hint_structure.hint_about_replaced_function,
+    hint_files.hint_about_redefined_functions,
+    hint_structure.hint_about_uncalled_function,
+    hint_structure.hint_about_single_reading,
+    hint_skipped_loops.hint_about_skipped_loop,
+    hint_structure.hint_about_discarded_value,
+    hint_structure.hint_about_unindented_statement,
+    hint_structure.hint_about_output_below_loop,
+    hint_passes.hint_about_stale_twin,
+    hint_passes.hint_about_kept_value,
 )
 _RESULT_RULES: Sequence[Rule] = (
-    hint_about_silent_agent,
-    hint_about_unasked_agent,
-    hint_about_text_of_agent,
-    hint_about_printed_object,
-    hint_about_missing_else,
-    hint_about_swapped_sides,
-    hint_about_missing_frame,
-    hint_about_quoted_values,
-    hint_about_returned_pair,
-    hint_about_quoted_object,
-    hint_about_large_step,
-    hint_about_raw_light,
-    hint_about_raw_report,
-    hint_about_wrong_scale,
-    hint_about_pixel_step,
-    hint_about_hasty_resending,
-    hint_about_zero_pass,
-    hint_about_added_factor,
-    hint_about_spoken_name,
-    hint_about_first_message,
-    hint_about_overlapping_speech,
-    hint_about_short_waits,
-    hint_about_functions,
-    hint_about_hidden_prefix,
-    hint_about_division,
-    hint_about_image_command,
-    hint_about_none_answers,
-    hint_about_shifted_numbers,
-    hint_about_swapped_values,
-    hint_about_texts,
-    hint_about_unspoken_text,
-    hint_about_missing_series,
-    hint_about_recognition,
-    hint_about_units,
-    hint_about_turns,
-    hint_about_missing_turn,
-    hint_about_curves,
-    hint_about_speeds,
-    hint_about_distances,
-    hint_about_range_start,
-    hint_about_range_step,
-    hint_about_unused_parameter,
-    hint_about_missing_reverse,
-    hint_about_mirrored_end,
-    hint_about_gain,
-    hint_about_reversed_distance,
-    hint_about_first_value,
-    hint_about_radius,
-    hint_about_joined_colours,
-    hint_about_partial_reading,
-    hint_about_thresholds,
-    hint_about_rare_readings,
-    hint_about_swallowed_flags,
-    hint_about_swapped_ports,
-    hint_about_swapped_atan2,
-    hint_about_repeated_words,
-    hint_about_inner_loop,
-    hint_about_last_number,
-    hint_about_early_output,
-    hint_about_exact_reading,
-    hint_about_few_samples,
-    hint_about_few_images,
-    hint_about_short_loop,
-    hint_about_single_reaction,
-    hint_about_unused_value,
+    hint_agents.hint_about_silent_agent,
+    hint_agents.hint_about_unasked_agent,
+    hint_agents.hint_about_text_of_agent,
+    hint_outputs.hint_about_printed_object,
+    hint_outputs.hint_about_missing_else,
+    hint_outputs.hint_about_swapped_sides,
+    hint_answer_forms.hint_about_missing_frame,
+    hint_answer_forms.hint_about_quoted_values,
+    hint_answers.hint_about_returned_pair,
+    hint_answers.hint_about_quoted_object,
+    hint_logic.hint_about_large_step,
+    hint_motion.hint_about_raw_light,
+    hint_scale.hint_about_raw_report,
+    hint_scale.hint_about_wrong_scale,
+    hint_recognition.hint_about_pixel_step,
+    hint_passes.hint_about_hasty_resending,
+    hint_passes.hint_about_zero_pass,
+    hint_passes.hint_about_added_factor,
+    hint_logic.hint_about_spoken_name,
+    hint_logic.hint_about_first_message,
+    hint_timing.hint_about_overlapping_speech,
+    hint_timing.hint_about_short_waits,
+    hint_functions.hint_about_functions,
+    hint_functions.hint_about_hidden_prefix,
+    hint_formulas.hint_about_division,
+    hint_answers.hint_about_image_command,
+    hint_answers.hint_about_none_answers,
+    hint_answers.hint_about_shifted_numbers,
+    hint_answers.hint_about_swapped_values,
+    hint_texts.hint_about_texts,
+    hint_texts.hint_about_unspoken_text,
+    hint_texts.hint_about_missing_series,
+    hint_recognition.hint_about_recognition,
+    hint_motion.hint_about_units,
+    hint_motion.hint_about_turns,
+    hint_motion.hint_about_missing_turn,
+    hint_motion.hint_about_curves,
+    hint_motion.hint_about_speeds,
+    hint_motion.hint_about_distances,
+    hint_logic.hint_about_range_start,
+    hint_logic.hint_about_range_step,
+    hint_logic.hint_about_unused_parameter,
+    hint_logic.hint_about_missing_reverse,
+    hint_logic.hint_about_mirrored_end,
+    hint_formulas.hint_about_gain,
+    hint_formulas.hint_about_reversed_distance,
+    hint_logic.hint_about_first_value,
+    hint_formulas.hint_about_radius,
+    hint_thresholds.hint_about_joined_colours,
+    hint_values.hint_about_partial_reading,
+    hint_thresholds.hint_about_thresholds,
+    hint_timing.hint_about_rare_readings,
+    hint_values.hint_about_swallowed_flags,
+    hint_values.hint_about_swapped_ports,
+    hint_values.hint_about_swapped_atan2,
+    hint_repetition.hint_about_repeated_words,
+    hint_repetition.hint_about_inner_loop,
+    hint_repetition.hint_about_last_number,
+    hint_repetition.hint_about_early_output,
+    hint_repetition.hint_about_exact_reading,
+    hint_values.hint_about_few_samples,
+    hint_values.hint_about_few_images,
+    hint_passes.hint_about_short_loop,
+    hint_repetition.hint_about_single_reaction,
+    hint_values.hint_about_unused_value,
 )
 #: Rules for failures without a known mistake. The first that applies is used.
 _FALLBACK_RULES: Sequence[Rule] = (
-    hint_about_failed_cell,
-    hint_about_several_programs,
-    hint_about_unentered_loop,
-    hint_about_answer_values,
-    hint_about_returned_values,
-    hint_about_narrow_except,
-    hint_about_wrong_number,
-    hint_about_failure_line,
-    hint_about_cause_line,
+    hint_errors.hint_about_failed_cell,
+    hint_files.hint_about_several_programs,
+    hint_failure_lines.hint_about_unentered_loop,
+    hint_answers.hint_about_answer_values,
+    hint_functions.hint_about_returned_values,
+    hint_functions.hint_about_narrow_except,
+    hint_counterfactuals.hint_about_wrong_number,
+    hint_failure_lines.hint_about_failure_line,
+    hint_cause_lines.hint_about_cause_line,
+)
+#: Rules for what was accepted although it differs from the description.
+_ACCEPTED_RULES: Sequence[Rule] = (
+    hint_accepted.hint_about_other_words,
+    hint_accepted.hint_about_missing_keys,
+    hint_accepted.hint_about_called_responder,
 )
 
 
@@ -319,12 +227,13 @@ def _collect_all_hints(clues: Clues) -> tuple[str, ...]:
 def collect_near_misses(clues: Clues) -> tuple[str, ...]:
     """Return everything that the rules find, regardless of marks. Problems that prevent everything else come first."""
     explained_errors = _apply_rules(_ERROR_RULES, clues)
-    errors = explained_errors or _apply_rules((hint_about_errors,), clues)
+    errors = explained_errors or _apply_rules((hint_errors.hint_about_errors,), clues)
     message_hints = _apply_rules(_MESSAGE_RULES, clues)
-    slips = () if errors else _apply_rules((hint_about_slips,), clues)
+    slips = () if errors else _apply_rules((hint_slips.hint_about_slips,), clues)
     limits = () if errors or slips else _apply_rules(_LIMIT_RULES, clues)
     structure = () if errors else _apply_rules(_STRUCTURE_RULES, clues)
-    stillness = () if errors or slips or limits or structure else _apply_rules((hint_about_stillness,), clues)
+    has_reason = errors or slips or limits or structure
+    stillness = () if has_reason else _apply_rules((hint_motion.hint_about_stillness,), clues)
     leading_hints = (*explained_errors, *message_hints) if explained_errors else (*message_hints, *errors)
     all_hints = (
         *_apply_rules(_FILE_RULES, clues),
@@ -356,4 +265,4 @@ def _apply_rule(rule: Rule, clues: Clues) -> tuple[str, ...]:
 
 def collect_accepted_differences(clues: Clues) -> tuple[str, ...]:
     """Return one sentence each on words and on keys that differ from the description. Empty if none do."""
-    return _apply_rules((hint_about_other_words, hint_about_missing_keys, hint_about_called_responder), clues)
+    return _apply_rules(_ACCEPTED_RULES, clues)
