@@ -7,18 +7,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, BinaryIO, Protocol, TypeVar
-
-from rich.console import RenderableType
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TypeAlias, TypeVar
 
 from service.grading.grade import Grade
 from service.reports.rows import ReportPage, TableRow
 from submissions.submission import Submission
 
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
 _V = TypeVar("_V")
-_Writes = TypeVar("_Writes", bound=Callable[..., str])
-_Shows = TypeVar("_Shows", bound=Callable[..., RenderableType])
+_F = TypeVar("_F", bound=Callable[..., object])
 _T = TypeVar("_T", covariant=True)
+_VC = TypeVar("_VC", contravariant=True)
+
+RowWriter: TypeAlias = Callable[[TableRow[Grade]], str]
+TableWriter: TypeAlias = Callable[[Sequence[TableRow[_V]]], str]
+Packer: TypeAlias = Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]
+
+
+class ViewRenderer(Protocol[_VC, _T]):
+    """Renders one grade as its reader sees it, with source lines if the submission is given."""
+
+    def __call__(self, view: _VC, submission: Submission | None = None) -> _T:
+        """Render the grade. Without the submission there is no excerpt."""
 
 
 class GradeRenderer(Protocol[_T]):
@@ -36,6 +48,9 @@ class FilledWorksheet:
     left_over: tuple[str, ...] = ()
 
 
+WorksheetWriter: TypeAlias = Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]
+
+
 @dataclass(frozen=True, slots=True)
 class Format:
     """An output format: ``document`` writes one grade to a file, ``table`` all grades of a batch to one file.
@@ -47,102 +62,70 @@ class Format:
     name: str
     suffix: str = ""
     document: GradeRenderer[str] | None = None
-    refusal: Callable[[TableRow[Grade]], str] | None = None
-    table: Callable[[Sequence[TableRow[Grade]]], str] | None = None
+    refusal: RowWriter | None = None
+    table: TableWriter[Grade] | None = None
     terminal: GradeRenderer[RenderableType] | None = None
-    worksheet: Callable[[Sequence[TableRow[Grade]], str], FilledWorksheet] | None = None
-    archive: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]] | None = None
+    worksheet: WorksheetWriter[Grade] | None = None
+    archive: Packer | None = None
 
 
 FORMATS: dict[str, Format] = {}
 
 
-def register_document(name: str, suffix: str, view: Callable[[Grade], Any]) -> Callable[[_Writes], _Writes]:
-    """Register a function that writes one grade, as seen through ``view``, with the submission if it is given."""
-
-    def register(render: _Writes) -> _Writes:
-        def render_document(grade: Grade, submission: Submission | None = None, /) -> str:
-            return render(view(grade), submission)
-
-        FORMATS[name] = replace(_find_format(name), suffix=suffix, document=render_document)
-        return render
-
-    return register
-
-
-def register_refusal(name: str) -> Callable[[Callable[[TableRow[Grade]], str]], Callable[[TableRow[Grade]], str]]:
-    """Register a function that writes the document of a rejected row."""
-
-    def register(render: Callable[[TableRow[Grade]], str]) -> Callable[[TableRow[Grade]], str]:
-        FORMATS[name] = replace(_find_format(name), refusal=render)
-        return render
-
-    return register
-
-
-def register_table(
+def register_document(
     name: str, suffix: str, view: Callable[[Grade], _V]
-) -> Callable[[Callable[[Sequence[TableRow[_V]]], str]], Callable[[Sequence[TableRow[_V]]], str]]:
+) -> Callable[[ViewRenderer[_V, str]], ViewRenderer[_V, str]]:
+    """Register a function that writes one grade, as seen through ``view``, with the submission if it is given."""
+    return _register(name, lambda render: {"suffix": suffix, "document": _apply_view(view, render)})
+
+
+def register_terminal(
+    name: str, view: Callable[[Grade], _V]
+) -> Callable[[ViewRenderer[_V, RenderableType]], ViewRenderer[_V, RenderableType]]:
+    """Register a function that shows one grade, as seen through ``view``, in a terminal."""
+    return _register(name, lambda render: {"terminal": _apply_view(view, render)})
+
+
+def register_refusal(name: str) -> Callable[[RowWriter], RowWriter]:
+    """Register a function that writes the document of a rejected row."""
+    return _register(name, lambda render: {"refusal": render})
+
+
+def register_table(name: str, suffix: str, view: Callable[[Grade], _V]) -> Callable[[TableWriter[_V]], TableWriter[_V]]:
     """Register a function that writes the rows of a batch, with their grades as seen through ``view``."""
-
-    def register(render: Callable[[Sequence[TableRow[_V]]], str]) -> Callable[[Sequence[TableRow[_V]]], str]:
-        FORMATS[name] = replace(
-            _find_format(name), suffix=suffix, table=lambda rows: render([row.apply_view(view) for row in rows])
-        )
-        return render
-
-    return register
+    return _register(
+        name,
+        lambda render: {"suffix": suffix, "table": lambda rows: render([row.apply_view(view) for row in rows])},
+    )
 
 
 def register_worksheet(
     name: str, suffix: str, view: Callable[[Grade], _V]
-) -> Callable[
-    [Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]], Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]
-]:
+) -> Callable[[WorksheetWriter[_V]], WorksheetWriter[_V]]:
     """Register a function that fills the rows of a batch into another system's table."""
-
-    def register(
-        render: Callable[[Sequence[TableRow[_V]], str], FilledWorksheet],
-    ) -> Callable[[Sequence[TableRow[_V]], str], FilledWorksheet]:
-        FORMATS[name] = replace(
-            _find_format(name),
-            suffix=suffix,
-            worksheet=lambda rows, given: render([row.apply_view(view) for row in rows], given),
-        )
-        return render
-
-    return register
+    return _register(
+        name,
+        lambda render: {
+            "suffix": suffix,
+            "worksheet": lambda rows, given: render([row.apply_view(view) for row in rows], given),
+        },
+    )
 
 
-def register_archive(
-    name: str, suffix: str
-) -> Callable[
-    [Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]],
-    Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
-]:
+def register_archive(name: str, suffix: str) -> Callable[[Packer], Packer]:
     """Register a function that packs the reports of a batch into a file and returns the students left out."""
-
-    def register(
-        pack: Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]],
-    ) -> Callable[[Iterable[ReportPage], BinaryIO], tuple[str, ...]]:
-        FORMATS[name] = replace(_find_format(name), suffix=suffix, archive=pack)
-        return pack
-
-    return register
+    return _register(name, lambda pack: {"suffix": suffix, "archive": pack})
 
 
-def register_terminal(name: str, view: Callable[[Grade], Any]) -> Callable[[_Shows], _Shows]:
-    """Register a function that shows one grade, as seen through ``view``, in a terminal."""
+def _apply_view(view: Callable[[Grade], _V], render: ViewRenderer[_V, _T]) -> GradeRenderer[_T]:
+    return lambda grade, submission=None, /: render(view(grade), submission)
 
-    def register(render: _Shows) -> _Shows:
-        def render_terminal(grade: Grade, submission: Submission | None = None, /) -> RenderableType:
-            return render(view(grade), submission)
 
-        FORMATS[name] = replace(_find_format(name), terminal=render_terminal)
-        return render
+def _register(name: str, describe: Callable[[_F], dict[str, Any]]) -> Callable[[_F], _F]:
+    """Return a decorator that adds the parts of a format that ``describe`` makes of the decorated function."""
+
+    def register(function: _F) -> _F:
+        FORMATS[name] = replace(FORMATS.get(name, Format(name)), **describe(function))
+        return function
 
     return register
-
-
-def _find_format(name: str) -> Format:
-    return FORMATS.get(name, Format(name))

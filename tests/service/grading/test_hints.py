@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import io
 import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 from notebook_builder import notebook
 from paths import DATA, ROOT
@@ -28,10 +26,9 @@ from service.grading.judging import limited_judging
 from service.grading.run_plan import plan_run
 from service.grading.trial_runner import TrialRunner
 from service.reports.formats import FORMATS
-from service.reports.formats.rich_text import render_rich_report
 from service.reports.html import render_report_page
 from service.reports.rows import TableRow
-from service.reports.view import build_staff_view, build_student_view
+from service.reports.view import build_student_view
 from sim.errors import UsageError
 from sim.recording import TimedText
 from submissions.assignment.definition import Assignment
@@ -119,12 +116,7 @@ def test_every_format_begins_with_the_cause(runner: TrialRunner, tmp_path: Path)
     cause, criterion = 'prints "py::0"', graded.criteria[0].title
     assert cause in hint
     row = TableRow(Student("ada"), "ada.zip", graded.assignment, graded)
-    console = Console(width=400, record=True, file=io.StringIO())
-    console.print(render_rich_report(build_staff_view(graded)))
-    documents = {
-        "terminal": console.export_text(),
-        "page": unescape(render_report_page(build_student_view(graded), {})),
-    }
+    documents = {"page": unescape(render_report_page(build_student_view(graded), {}))}
     for name, form in FORMATS.items():
         if form.document is not None:
             documents[f"{name} document"] = unescape(form.document(graded)).replace('\\"', '"')

@@ -13,7 +13,6 @@ from dataclasses import replace
 import pandas
 import pytest
 from junitparser import Error, Failure, JUnitXml, Skipped
-from rich.console import Console
 
 import report_builders as build
 from builders import accept_one
@@ -23,7 +22,6 @@ from service.batch_rows import build_row, describe_missing_grade
 from service.grading.grade import Grade, PoolValue
 from service.grading.judging.message_parts import describe_line
 from service.reports.formats import FORMATS
-from service.reports.formats.rich_text import build_marks_table
 from service.reports.html import render_refusal_page
 from service.reports.rows import ReportPage, TableRow, describe_missing_part, select_student_rows
 from service.store.batches import job_lines
@@ -118,22 +116,6 @@ def test_marks_over_a_pool_have_columns_for_their_status_trials_and_bounds(form:
     assert [line["reason"] for line in lines] == [ADA.reason, MARY.reason, ZOE.reason]
     # Only the criterion with a pool has these columns.
     assert sum("trials_run" in column for column in lines[0]) == 1
-
-
-def test_the_table_of_marks_shows_their_status_in_a_terminal() -> None:
-    assert ADA.grade is not None
-    first, *others = ADA.grade.criteria
-    pool = PoolValue(200, 40, 0.626, 0.813, is_decided=False)
-    text = _print_table(replace(ADA.grade, criteria=(replace(first, pool=pool), *others)))
-    assert re.search(r"Marks +Status +Trials +Value +Criterion", text)
-    assert re.search(r"provisional +40 of 200 +62% to 82% ", text)
-    assert "Status" not in _print_table(ADA.grade)
-
-
-def _print_table(grade: Grade) -> str:
-    console = Console(width=400, record=True, file=io.StringIO())
-    console.print(build_marks_table(grade))
-    return console.export_text()
 
 
 def _rows_of_csv(text: str) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +9,6 @@ from decimal import Decimal
 from html import unescape
 
 import pytest
-from rich.console import Console
 
 import report_builders as build
 from service.grading.grade import CriterionResult, Evidence, Grade, StaffAdjustment
@@ -19,7 +17,6 @@ from service.reports.diagnosis import diagnose
 from service.reports.formats.gradescope import build_gradescope_document
 from service.reports.formats.json_output import build_json_document
 from service.reports.formats.junit import render_junit
-from service.reports.formats.rich_text import render_rich_report
 from service.reports.formats.text import render_plain_text
 from service.reports.html import render_report_page
 from service.reports.page import build_page
@@ -187,15 +184,8 @@ def test_full_marks_have_no_cause() -> None:
     assert (diagnosis.cause, diagnosis.lost, diagnosis.excerpt) == (FULL_MARKS, frozenset(), None)
 
 
-def _on_a_terminal(grade: Grade) -> str:
-    console = Console(width=400, record=True, file=io.StringIO())
-    console.print(render_rich_report(build_staff_view(grade), build.faulty_submission()))
-    return console.export_text()
-
-
 WRITERS: dict[str, Callable[[Grade], str]] = {
     "text": lambda grade: render_plain_text(build_staff_view(grade), build.faulty_submission()),
-    "terminal": _on_a_terminal,
     "gradescope": lambda grade: build_gradescope_document(build_gradebook_view(grade), build.faulty_submission())[
         "output"
     ],

@@ -9,7 +9,6 @@ from decimal import Decimal
 from xml.etree import ElementTree
 
 import pytest
-from rich.console import Console
 
 import report_builders as build
 from responders.sandbox.meter import JobCosts, JobLimits
@@ -21,8 +20,7 @@ from service.reports.formats.gradescope import build_gradescope_document, render
 from service.reports.formats.json_output import build_json_document, render_json
 from service.reports.formats.junit import render_junit
 from service.reports.formats.moodle import render_moodle_csv
-from service.reports.formats.rich_text import render_rich_report
-from service.reports.formats.text import render_plain_text
+from service.reports.formats.text import render_coloured_text, render_plain_text
 from service.reports.html import render_report_page
 from service.reports.verdict_sentences import describe_verdict
 from service.reports.view import View, build_gradebook_view, build_staff_view, build_student_view, find_worst_trial
@@ -56,9 +54,6 @@ LOST = (
 def test_every_report_says_what_the_channel_lost_and_why() -> None:
     view = build_staff_view(build.astray_grade())
     assert LOST in " ".join(render_plain_text(view).split())
-    console = Console(width=400, record=True, file=io.StringIO())
-    console.print(render_rich_report(view))
-    assert LOST in console.export_text()
     assert LOST in " ".join(render_report_page(view, {}).split())
     messages = build_json_document(view)["trials"][1]["messages"]
     assert messages[0] == {"t": 0.1, "sender": "robot", "text": "PY::0", "lost": "chance"}
@@ -86,24 +81,16 @@ def test_the_first_line_of_a_text_report_says_that_marks_are_provisional() -> No
     assert "Exact: all 200 trials of the pool were run." in exact
 
 
-@pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document] + ["page", "terminal"])
+@pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document] + ["page"])
 def test_full_marks_say_so_and_ask_for_nothing_more(form: str) -> None:
     made = build.shape_grade()
     full = replace(made, criteria=tuple(replace(each, marks=each.max_marks) for each in made.criteria))
-    console = Console(width=400, record=True, file=io.StringIO())
-    console.print(render_rich_report(build_staff_view(full)))
     document = FORMATS[form].document if form in FORMATS else None
-    outputs = (
-        document(full)
-        if document
-        else render_report_page(build_student_view(full), {})
-        if form == "page"
-        else console.export_text()
-    )
+    outputs = document(full) if document else render_report_page(build_student_view(full), {})
     words = " ".join(re.sub("<script.*?</script>", "", outputs, flags=re.DOTALL).split())
     assert "missing" not in words
     assert "to be gained" not in words
-    if form in ("text", "gradescope", "page", "terminal"):
+    if form in ("text", "gradescope", "page"):
         assert "Full marks." in words
         assert "No changes needed." in words
     else:
@@ -189,10 +176,9 @@ def test_plain_text_says_marks_verdict_and_where_it_failed() -> None:
 
 
 def test_terminals_get_no_control_codes_from_students() -> None:
-    grade = build.hostile_grade()
-    for each in (render_plain_text(build_staff_view(grade)), _on_a_terminal(build_staff_view(grade))):
-        assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(each)
-        assert "[red]x[/red]" in each
+    text = render_plain_text(build_staff_view(build.hostile_grade()))
+    assert not {"\x1b", "\x00", "\u202e", "\ud800"} & set(text)
+    assert "[red]x[/red]" in text
 
 
 def test_student_view_drops_hidden_parts_and_keeps_indices_right() -> None:
@@ -239,6 +225,14 @@ def test_every_verdict_has_words(verdict: Verdict) -> None:
     assert ("not your fault" in words.explanation) is is_ours
 
 
+def test_a_terminal_shows_the_lines_of_the_text_in_colours() -> None:
+    for grade in (build.faulty_grade(), build.hostile_grade(), build.shape_grade()):
+        view = build_staff_view(grade)
+        coloured = render_coloured_text(view, build.faulty_submission())
+        assert coloured.plain == render_plain_text(view, build.faulty_submission())
+        assert {"bold", "red"} & {str(span.style) for span in coloured.spans}
+
+
 def test_marks_are_not_rounded_on_the_way() -> None:
     grade = build.line_follower_grade()
     tenth = replace(grade.criteria[0], marks=Decimal("0.1"))
@@ -248,13 +242,6 @@ def test_marks_are_not_rounded_on_the_way() -> None:
         ]
         == 0.3
     )
-
-
-def _on_a_terminal(view: View) -> str:
-    console = Console(file=io.StringIO(), width=100, color_system=None)
-    console.print(render_rich_report(view))
-    assert isinstance(console.file, io.StringIO)
-    return console.file.getvalue()
 
 
 def _render_without_images(view: View) -> str:
@@ -268,12 +255,11 @@ FIGURES = "CPU time: 3.2 of 240 s. Sleep: 0 of 20 s. Output: 0.1 of 64 MB."
 def test_staff_read_what_was_used_and_students_nothing_that_grows_with_hidden_trials() -> None:
     for_staff = (
         render_plain_text(build_staff_view(COSTLY)),
-        _on_a_terminal(build_staff_view(COSTLY)),
         render_report_page(build_staff_view(COSTLY), {}),
     )
     assert all(FIGURES in page for page in for_staff)
     viewed = build_student_view(COSTLY)
-    for_students = (render_plain_text(viewed), _on_a_terminal(viewed), _render_without_images(viewed))
+    for_students = (render_plain_text(viewed), _render_without_images(viewed))
     in_files = (
         render_gradescope(build_gradebook_view(COSTLY)),
         render_moodle_csv([build.row_of(COSTLY).apply_view(build_gradebook_view)]),
