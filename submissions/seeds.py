@@ -65,6 +65,14 @@ def format_secret_name(secret_sha256: str) -> str:
     return secret_sha256[:8]
 
 
+def choose_secret(needed_sha256: str, own_secret: Secret) -> Secret | None:
+    """Return the secret with this hash, which a stored grade needs; None if it is another installation's.
+
+    Grades from before an installation had a secret need ``PUBLIC_SECRET``.
+    """
+    return next((each for each in (own_secret, PUBLIC_SECRET) if each.sha256 == needed_sha256), None)
+
+
 def build_seed_table(secret: SeedSource, world_names: Iterable[str]) -> SeedTable:
     """Return the seeds of the named worlds."""
     return SeedTable(secret.sha256, {_hash_name(name): secret.compute_seed(name) for name in world_names})

@@ -111,6 +111,8 @@ def grade_all(
                     else ()
                 )
                 if causes:
+                    if not definition.reruns.causes:
+                        print_note(f"{definition.id} has causes = false, so no trial is run again")
                     grade = add_causes(
                         grade,
                         submission,

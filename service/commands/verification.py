@@ -19,7 +19,7 @@ from sim.errors import HostError
 from sim.recording import Recording, Verdict
 from submissions.criteria import Criterion
 from submissions.grading_request import GradingRequest
-from submissions.seeds import PUBLIC_SECRET, Secret, format_secret_name
+from submissions.seeds import PUBLIC_SECRET, Secret, choose_secret, format_secret_name
 
 #: A stored trial and its repetition.
 TrialPair = tuple[TrialResult, TrialResult]
@@ -139,18 +139,19 @@ def _comparison_to_json(
 
 def _check_secret(grading: StoredGrading) -> Secret:
     """Return the secret that the grading used. Raises HostError if this installation has another secret."""
-    own_secret, needed_hash = grading.own_secret, grading.secret_sha256
-    if needed_hash is None:
-        print_note("graded before this installation had a secret: regraded in the same worlds")
-        return PUBLIC_SECRET
-    if needed_hash != own_secret.sha256:
+    own_secret, needed_hash = grading.own_secret, grading.grade.secret_sha256
+    secret = choose_secret(needed_hash, own_secret)
+    if secret is None:
         raise HostError(
             f"grade {grading.job_id} cannot be verified with this secret: it was graded with "
             f"{format_secret_name(needed_hash)}, and "
             f"the secret here is {own_secret.name}; set ROBOMARK_SECRET to the original secret"
         )
-    print_note(f"secret: {own_secret.name}")
-    return own_secret
+    if secret == PUBLIC_SECRET:
+        print_note("graded before this installation had a secret: regraded in the same worlds")
+    else:
+        print_note(f"secret: {secret.name}")
+    return secret
 
 
 def _compare_marks(

@@ -174,6 +174,13 @@ def is_name(token: str) -> bool:
     return _NAME.match(token) is not None
 
 
+def iterate_equality_tests(tokens: Sequence[str]) -> Iterator[tuple[Sequence[str], str]]:
+    """Yield the tokens before each ``==`` and ``!=``, and the token after it."""
+    for index, sign in enumerate(tokens[:-1]):
+        if index and sign in ("==", "!="):
+            yield tokens[:index], tokens[index + 1]
+
+
 def join_tokens(tokens: Sequence[str]) -> str:
     """Join the tokens into readable code."""
     text = ""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 
 from service.grading.hint_clues import Listing
-from service.grading.hint_code import Statement, is_name, join_tokens
+from service.grading.hint_code import Statement, is_name, iterate_equality_tests, join_tokens
 from service.language import translatable
 from sim.sentences import Sentence
 
@@ -93,11 +93,10 @@ def check_uncalled_predicate(listing: Listing, statement: Statement) -> str:
 
 def check_colour_name(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``color_name == "red"``, which is never true."""
-    tokens = statement.tokens
     names = {each.target for each in listing.code.statements if each.target and each.tokens[-1] == "color_name"}
-    for index in range(1, len(tokens) - 1):
-        name, sign, value = tokens[index - 1 : index + 2]
-        if sign not in ("==", "!=") or value[:1] not in ("'", '"') or value[1:-1] in _COLOUR_NAMES:
+    for left, value in iterate_equality_tests(statement.tokens):
+        name = left[-1]
+        if value[:1] not in ("'", '"') or value[1:-1] in _COLOUR_NAMES:
             continue
         if name != "color_name" and name not in names:
             continue

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from responders.message_format import JSON
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
 from service.grading.hint_clues import Clues, Listing
-from service.grading.hint_code import Statement, is_name, join_tokens
+from service.grading.hint_code import Statement, is_name, iterate_equality_tests, join_tokens
 from service.grading.hint_tables import USAGE
 from service.grading.judging.message_parts import add_place
 from service.language import translatable
@@ -358,17 +358,16 @@ def check_second_text(listing: Listing, statement: Statement) -> str:
 
 def check_robot_number(listing: Listing, statement: Statement) -> str:
     """Return a hint on ``sender == "1"`` and on ``robot_number() == 0``: the numbers are 1 and 2."""
-    tokens = statement.tokens
-    for index in range(1, len(tokens) - 1):
-        match = _DIGITS.match(tokens[index + 1])
-        is_number = tokens[index - 1] == "sender" or tokens[max(index - 3, 0) : index] == ("robot_number", "(", ")")
-        number = match[1] if match is not None else tokens[index + 1]
+    for left, value in iterate_equality_tests(statement.tokens):
+        match = _DIGITS.match(value)
+        number = match[1] if match is not None else value
         is_wrong = match is not None or (number.isdecimal() and number not in ("1", "2"))
-        if not is_wrong or not is_number or tokens[index] not in ("==", "!="):
+        is_number = left[-1] == "sender" or left[-3:] == ("robot_number", "(", ")")
+        if not is_wrong or not is_number:
             continue
         if any("sender" in each.bound_names for each in listing.code.statements):
             continue
-        name = "sender" if tokens[index - 1] == "sender" else "robot_number()"
+        name = "sender" if left[-1] == "sender" else "robot_number()"
         if match is None:
             return Sentence(
                 "%(place)s: %(name)s is never %(number)s. The robots have the numbers 1 and 2",
@@ -380,7 +379,7 @@ def check_robot_number(listing: Listing, statement: Statement) -> str:
             "%(place)s: %(name)s is a number, and never equals the text %(text)s. Write %(number)s without quotes",
             place=listing.locate(statement.line),
             name=name,
-            text=tokens[index + 1],
+            text=value,
             number=number,
         )
     return ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Literal
 
@@ -87,8 +87,8 @@ class MutantCheck:
 
 
 @dataclass(frozen=True)
-class _MutatedSubmission(Submission):
-    """A mutant with the seeds of the original, so that both draw the same random numbers."""
+class _Original(Submission):
+    """A reference whose mutants have its hash and therefore its seeds, so that all draw the same random numbers."""
 
     original_sha256: str = ""
 
@@ -150,7 +150,8 @@ class _ReferenceComparison:
 
     def __init__(self, reference: Submission, assignment: Assignment, runner: TrialRunner) -> None:
         limits = replace(assignment.limits, program_cpu=min(assignment.limits.program_cpu, _PROGRAM_CPU_SECONDS))
-        self._reference, self._runner = reference, runner
+        values = {each.name: getattr(reference, each.name) for each in fields(reference)}
+        self._reference, self._runner = _Original(**values, original_sha256=reference.sha256), runner
         self._assignment = replace(assignment, limits=limits)
         first_trials = {each.scenario.id: (each.scenario.id, each.index) for each in reversed([*assignment.trials()])}
         self._sample = select_trials(self._assignment, first_trials.values())
@@ -161,7 +162,7 @@ class _ReferenceComparison:
 
     def grade_mutant(self, mutant: Mutant) -> MutantResult:
         """Grade a mutant and return its result."""
-        submission = self._build_submission(mutant)
+        submission = self._reference.with_source(mutant.file, mutant.source)
         if self._sample_grade is not None:
             lost_ids = [
                 each
@@ -183,18 +184,6 @@ class _ReferenceComparison:
 
     def _grade(self, submission: Submission, assignment: Assignment) -> Grade:
         return grade(submission, assignment, runner=self._runner, extent=PoolExtent.UNTIL_DECIDED, with_hints=False)
-
-    def _build_submission(self, mutant: Mutant) -> Submission:
-        reference = self._reference
-        changed = reference.with_source(mutant.file, mutant.source)
-        return _MutatedSubmission(
-            student=changed.student,
-            program=changed.program,
-            responder=changed.responder,
-            files=changed.files,
-            notes=changed.notes,
-            original_sha256=reference.sha256,
-        )
 
 
 def _list_lost(changed: Grade, reference: Grade) -> tuple[str, ...]:

@@ -25,7 +25,6 @@ class StoredGrading:
     grade: Grade
     request: GradingRequest
     grader_sha256: str | None
-    secret_sha256: str | None  # None if graded before the installation had a secret
     own_secret: Secret  # of the installation
 
 
@@ -80,4 +79,4 @@ def load_grading(service: Service, actor: Actor, grade: str) -> StoredGrading:
             results.load_original_grade(session, job.id),
             stored_requests.load_grading_request(session, job.id),
         )
-        return StoredGrading(job.id, stored_grade, request, job.grader_sha256, job.secret_sha256, own_secret)
+        return StoredGrading(job.id, stored_grade, request, job.grader_sha256, own_secret)

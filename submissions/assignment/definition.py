@@ -68,10 +68,12 @@ class Training:
 class Reruns:
     """What students learn from reruns of their trials with one ingredient exchanged.
 
-    With ``halves``, the reference's parts take the place of the student's, to show which part loses the marks.
-    ``reveals`` is the number of causes in hidden trials that one student may see; staff see all.
+    Without ``causes``, no trials are run again. With ``halves``, the reference's parts take the place of the student's,
+    to show which part loses the marks. ``reveals`` is the number of causes in hidden trials that one student may see;
+    staff see all.
     """
 
+    causes: bool = True
     halves: bool = False
     reveals: int = 0
 

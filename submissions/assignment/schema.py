@@ -230,6 +230,7 @@ class TrainingTable(StrictTable):
 class RerunsTable(StrictTable):
     """What students learn from reruns of their trials."""
 
+    causes: bool = True
     halves: bool = False
     reveals: int = Field(default=0, ge=0, le=100)
 

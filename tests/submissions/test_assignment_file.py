@@ -157,7 +157,7 @@ BOTH = "[reruns]\n{}\n" + SCENARIO + FINISHES
     ("tables", "mistake"),
     [
         (BOTH.format('halves = "yes"'), 'halves is "yes", expected true or false'),
-        (BOTH.format("halfs = true"), '"halfs" is not a key of this table, expected "halves" or "reveals"'),
+        (BOTH.format("halfs = true"), '"halfs" is not a key of this table, expected "causes", "halves" or "reveals"'),
         (BOTH.format("reveals = -1"), "reveals is -1, expected at least 0"),
         (BOTH.format("reveals = 2"), "reveals is 2, but every scenario is visible, expected a hidden scenario with it"),
         (
@@ -171,11 +171,11 @@ def test_mistakes_in_reruns(tmp_path: Path, tables: str, mistake: str) -> None:
     assert mistake in problem
 
 
-def test_reruns_are_read_and_off_by_default(tmp_path: Path) -> None:
+def test_reruns_are_read_and_show_neither_halves_nor_hidden_causes_by_default(tmp_path: Path) -> None:
     assert read_assignment(written(tmp_path / "a", HEAD + SCENARIO + FINISHES)).reruns == Reruns()
     hidden = SCENARIO + 'visibility = "hidden"\n'
-    text = HEAD + "[reruns]\nhalves = true\nreveals = 3\n" + hidden + FINISHES
-    assert read_assignment(written(tmp_path / "b", text)).reruns == Reruns(halves=True, reveals=3)
+    text = HEAD + "[reruns]\ncauses = false\nhalves = true\nreveals = 3\n" + hidden + FINISHES
+    assert read_assignment(written(tmp_path / "b", text)).reruns == Reruns(causes=False, halves=True, reveals=3)
 
 
 def test_version_follows_every_file(tmp_path: Path) -> None:

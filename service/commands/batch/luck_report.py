@@ -23,7 +23,7 @@ from service.operations.context import Actor, Service
 from service.operations.stored_grades import JobLine
 from service.operations.types import JobState
 from service.reports.display_text import format_decimal, to_one_line
-from submissions.seeds import PUBLIC_SECRET
+from submissions.seeds import choose_secret
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -78,9 +78,9 @@ def _load(service: Service, actor: Actor, job_id: str) -> GradedSubmission | Non
     """Load a grade with its input; None if this installation cannot repeat it."""
     grading = stored_grades.load_grading(service, actor, job_id)
     grade, request = grading.grade, grading.request
-    if grading.secret_sha256 not in (None, grading.own_secret.sha256):
+    secret = choose_secret(grade.secret_sha256, grading.own_secret)
+    if secret is None:
         return None
-    secret = PUBLIC_SECRET if grading.secret_sha256 is None else grading.own_secret
     is_same = (grade.submission, grade.assignment_version) == (request.submission.sha256, request.assignment.version)
     known_trials = {(each.scenario.id, each.index) for each in request.assignment.trials(secret)}
     has_own_trials = {(each.scenario, each.index) for each in grade.trials} <= known_trials

@@ -7,26 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from decimal import Decimal
 from types import MappingProxyType
 
 from service.grading.grade import ShownCause
 from service.grading.reruns.causes import Cause, CauseKind
 from service.grading.reruns.engine import Rerun
 from service.grading.reruns.exchanges import (
-    SECOND_PROGRAM_PART,
-    AnswersFrom,
     ChangedLine,
     Exchange,
-    GivenPart,
     MoreTime,
     VisibleStart,
     WithoutChannelEffect,
     WithoutLightNoise,
     WithoutMessageLoss,
     WithoutMotorNoise,
+    get_part_file,
 )
-from service.grading.reruns.halves import decide_losing_parts, find_first_difference
+from service.grading.reruns.halves import decide_losing_parts
 from service.grading.reruns.mildest_sentences import (
     CONDITIONS_STEP,
     NOISE_STEP,
@@ -35,13 +32,10 @@ from service.grading.reruns.mildest_sentences import (
     describe_mildest,
     describe_mildest_step,
 )
+from service.grading.reruns.part_sentences import describe_part_step, describe_parts, describe_result
 from service.language import translatable
 from sim.sentences import Sentence, join_sentences, join_with_and
-from submissions.submission import PART_FILES, SECOND_PROGRAM
 
-_FILES: Mapping[str, str] = MappingProxyType(
-    {"program": PART_FILES["program"], "responder": PART_FILES["responder"], SECOND_PROGRAM_PART: SECOND_PROGRAM}
-)
 _MAX_CHANGE = 60
 _EFFECTS: Mapping[str, str] = MappingProxyType(
     {
@@ -112,7 +106,7 @@ def describe_next_step(cause: Cause) -> str:
     """Return what the student does next about a cause."""
     match cause.kind:
         case "parts":
-            return _describe_part_step(cause)
+            return describe_part_step(cause.reruns, cause.criterion)
         case "line":
             (change,) = (each for each in cause.reruns[0].exchanges if isinstance(each, ChangedLine))
             return Sentence("Check line %(line)s of %(file)s, then submit again.", line=change.line, file=change.file)
@@ -130,152 +124,11 @@ def describe_next_step(cause: Cause) -> str:
     return Sentence(CONDITIONS_STEP)
 
 
-def _describe_part_step(cause: Cause) -> str:
-    reruns = [rerun for rerun in cause.reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
-    losing = decide_losing_parts(reruns, cause.criterion)
-    match losing:
-        case ("responder",):
-            return Sentence("Fix your responder, then submit again.")
-        case ("program",):
-            return Sentence("Fix your program, then submit again.")
-        case ("program", "responder") if all(rerun.passes(cause.criterion) for rerun in reruns):
-            return Sentence(
-                "Compare the texts that your program sends and expects with those that your responder expects and "
-                "answers, then submit again."
-            )
-    if len(losing) == 1:
-        return Sentence("Fix %(part)s, then submit again.", part=_format_part(losing[0]))
-    return Sentence("Fix these parts, then submit again: %(parts)s.", parts=_join_parts(losing))
-
-
 def _list_losing_files(cause: Cause) -> tuple[str, ...]:
     """Return the files of the parts that lose the marks; empty for another kind of cause."""
     if cause.kind != "parts":
         return ()
-    reruns = [rerun for rerun in cause.reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
-    return tuple(_format_part(part) for part in decide_losing_parts(reruns, cause.criterion))
-
-
-def describe_result(rerun: Rerun, criterion: str) -> str:
-    """Return the result of a rerun that loses nothing, as a verb phrase."""
-    outcome = rerun.outcomes[criterion]
-    if outcome.is_whole:
-        if outcome.max_marks == 1:
-            return Sentence("gets the mark")
-        return Sentence("gets all %(marks)s marks", marks=_format_marks(outcome.marks))
-    count = len((outcome.passed | outcome.failed) & rerun.recordings.keys())
-    if count == 1:
-        return Sentence("passes in the trial that was run again")
-    return Sentence("passes in all %(count)s trials that were run again", count=count)
-
-
-def _format_marks(marks: Decimal) -> str:
-    return f"{marks.normalize():f}"
-
-
-def _describe_parts(reruns: Sequence[Rerun], criterion: str) -> str:
-    part_reruns = [rerun for rerun in reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
-    losing = decide_losing_parts(part_reruns, criterion)
-    if not losing:
-        return ""
-    single = {_get_parts(rerun)[0]: rerun for rerun in part_reruns if len(rerun.exchanges) == 1}
-    parts = tuple(single)
-    if not all(single[part].passes(criterion) for part in losing):
-        return _describe_parts_that_still_lose(losing, parts)
-    if len(losing) > 1:
-        return _describe_misfit(single, losing, criterion)
-    (part,) = losing
-    result = describe_result(single[part], criterion)
-    if len(parts) > 2 or part not in _SINGLE_PARTS:
-        sentence: str = Sentence(
-            "With the reference's %(part)s in place of yours, the rest of your submission %(result)s: this part "
-            "loses the marks.",
-            part=_format_part(part),
-            result=result,
-        )
-    else:
-        sentence = Sentence(_SINGLE_PARTS[part], result=result)
-    if part != "responder":
-        return sentence
-    return join_sentences(
-        sentence, _describe_first_difference(single[part]), _describe_losing_answer(reruns, criterion)
-    )
-
-
-_SINGLE_PARTS: Mapping[str, str] = MappingProxyType(
-    {
-        "responder": translatable(
-            "With the reference's responder in place of yours, the same program %(result)s: the responder loses the "
-            "marks."
-        ),
-        "program": translatable(
-            "With the reference's program in place of yours, the same responder %(result)s: the program loses the "
-            "marks."
-        ),
-    }
-)
-
-
-def _describe_parts_that_still_lose(losing: Sequence[str], parts: Sequence[str]) -> str:
-    if set(losing) == {"program", "responder"} == set(parts):
-        return Sentence(
-            "With the reference's responder, your program still loses marks. With the reference's program, your "
-            "responder still loses marks."
-        )
-    if len(losing) > 1:
-        return Sentence(
-            "With the reference's parts in place of the others, each of these parts still loses marks: %(parts)s.",
-            parts=_join_parts(losing),
-        )
-    (part,) = losing
-    if len(parts) == 2 and part == "program":
-        return Sentence("With the reference's responder in place of yours, your program still loses marks.")
-    if len(parts) == 2 and part == "responder":
-        return Sentence("With the reference's program in place of yours, your responder still loses marks.")
-    return Sentence(
-        "With the reference's parts in place of all others, your %(part)s still loses marks.", part=_format_part(part)
-    )
-
-
-def _describe_misfit(single: Mapping[str, Rerun], losing: Sequence[str], criterion: str) -> str:
-    """Describe parts each of which the reference's replaces without loss."""
-    if set(losing) == {"program", "responder"} == set(single):
-        return Sentence(
-            "With the reference's responder, the same program %(first)s. With the reference's program, the same "
-            "responder %(second)s. Your program and your responder do not fit together.",
-            first=describe_result(single["responder"], criterion),
-            second=describe_result(single["program"], criterion),
-        )
-    return Sentence(
-        "With one of these parts of the reference in place of yours, the rest of your submission loses no marks: "
-        "%(parts)s.",
-        parts=_join_parts(losing),
-    )
-
-
-def _describe_first_difference(rerun: Rerun) -> str:
-    numbers = (find_first_difference(rerun.originals[trial], rerun.recordings[trial]) for trial in rerun.trials)
-    number = next((each for each in numbers if each is not None), None)
-    return "" if number is None else Sentence("The first answer that differs is number %(number)s.", number=number)
-
-
-def _describe_losing_answer(reruns: Sequence[Rerun], criterion: str) -> str:
-    passing: int | None = None
-    failing: int | None = None
-    for rerun in reruns:
-        for exchange in rerun.exchanges:
-            if isinstance(exchange, AnswersFrom) and rerun.passes(criterion):
-                passing = exchange.number
-            elif isinstance(exchange, AnswersFrom) and rerun.loses(criterion):
-                failing = exchange.number
-    if passing is None or failing != passing + 1:
-        return ""
-    return Sentence(
-        "With the reference's answers from number %(number)s on, the trial passes; from number %(next)s on, it still "
-        "fails.",
-        number=passing,
-        next=failing,
-    )
+    return tuple(get_part_file(part) for part in decide_losing_parts(cause.reruns, cause.criterion))
 
 
 def _describe_conditions(reruns: Sequence[Rerun], criterion: str) -> str:
@@ -355,19 +208,6 @@ def _describe_start(reruns: Sequence[Rerun], criterion: str) -> str:
     )
 
 
-def _join_parts(parts: Sequence[str]) -> str:
-    return join_with_and([_format_part(part) for part in parts])
-
-
-def _format_part(part: str) -> str:
-    """Return the name of the part's file, under which students know it."""
-    return _FILES.get(part, f"{part}.py")
-
-
-def _get_parts(rerun: Rerun) -> tuple[str, ...]:
-    return tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart))
-
-
 def _describe_line(reruns: Sequence[Rerun], criterion: str) -> str:
     (rerun,) = reruns
     (change,) = (each for each in rerun.exchanges if isinstance(each, ChangedLine))
@@ -398,7 +238,7 @@ def _describe_change(causes: Sequence[Cause]) -> str:
 
 _DESCRIPTIONS: Mapping[CauseKind, Callable[[Sequence[Rerun], str], str]] = MappingProxyType(
     {
-        "parts": _describe_parts,
+        "parts": describe_parts,
         "conditions": _describe_conditions,
         "chance": _describe_chance,
         "time": _describe_time,

@@ -10,13 +10,13 @@ from decimal import Decimal
 
 from service.grading.number_roles import describe_direction, find_direction, find_role
 from service.grading.reruns.engine import BudgetSpent, Rerun, RerunEngine, RunTooLong
-from service.grading.reruns.exchanges import SECOND_PROGRAM_PART, ChangedLine, PartName
+from service.grading.reruns.exchanges import ChangedLine, PartName, get_part_file
 from service.mutation.mutants import choose_mutants, iterate_mutants
 from service.mutation.operators import format_number
 from service.mutation.source_tree import Edit, SourceTree
 from sim.errors import UsageError
 from sim.sentences import Sentence
-from submissions.submission import PART_FILES, SECOND_PROGRAM, Part
+from submissions.submission import Part
 
 #: Operators whose mutants can be what the author meant. The others only take something away.
 _OPERATORS = frozenset(
@@ -34,11 +34,6 @@ _OPERATORS = frozenset(
 )
 _MAX_MUTANTS = 40
 _FACTORS = (1.5, 1 / 1.5, 2.0, 0.5, 1.2, 1 / 1.2, 3.0, 1 / 3)
-_FILES: dict[PartName, str] = {
-    "program": PART_FILES["program"],
-    "responder": PART_FILES["responder"],
-    SECOND_PROGRAM_PART: SECOND_PROGRAM,
-}
 
 
 def find_changed_line(engine: RerunEngine, criterion: str, parts: Sequence[PartName]) -> Rerun | None:
@@ -89,7 +84,7 @@ def _list_mutants(part: PartName, text: str) -> Iterator[ChangedLine]:
     mutants = [each for each in iterate_mutants(text, kind) if each.operator in _OPERATORS]
     # The last ones can make loops endless, which is expensive.
     for mutant in sorted(choose_mutants(mutants, _MAX_MUTANTS), key=lambda each: each.operator == "while and if"):
-        yield ChangedLine(part, _get_file(part), mutant.line, mutant.old, mutant.new, mutant.source)
+        yield ChangedLine(part, mutant.line, mutant.old, mutant.new, mutant.source)
 
 
 def _list_scaled_numbers(part: PartName, tree: SourceTree, factor: float) -> Iterator[ChangedLine]:
@@ -100,17 +95,12 @@ def _list_scaled_numbers(part: PartName, tree: SourceTree, factor: float) -> Ite
         if value == number.value:
             continue
         new = format_number(int(value) if float(value).is_integer() else value)
-        place = Sentence("line %(line)s of %(name)s", line=number.line, name=_get_file(part))
+        place = Sentence("line %(line)s of %(name)s", line=number.line, name=get_part_file(part))
         yield ChangedLine(
             part,
-            _get_file(part),
             number.line,
             tree.text[number.start : number.end],
             new,
             tree.apply(Edit(number.start, number.end, new)),
             describe_direction(role, find_direction(number.value, value, role), place),
         )
-
-
-def _get_file(part: PartName) -> str:
-    return _FILES.get(part, f"{part}.py")

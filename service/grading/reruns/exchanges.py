@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Literal, Protocol
 
 from responders.source_file import SourceFile
@@ -15,12 +16,21 @@ from responders.trial_spec import AgentSpec, EarlierAnswer, TrialSpec
 from service.grading.run_plan import RunPlan
 from sim.random_streams import RandomStream
 from sim.recording import SECOND, Message, Pose, Recording
+from submissions.submission import PART_FILES, SECOND_PROGRAM
 
 RedrawnStream = Literal["light noise", "motor noise", "messages"]
 ChannelEffect = Literal["duplication", "reordering", "corruption", "jitter"]
 #: A part of a submission: ``program``, ``responder``, ``second program``, or the name of an agent.
 PartName = str
 SECOND_PROGRAM_PART = "second program"
+_FILES: Mapping[PartName, str] = MappingProxyType(
+    {"program": PART_FILES["program"], "responder": PART_FILES["responder"], SECOND_PROGRAM_PART: SECOND_PROGRAM}
+)
+
+
+def get_part_file(part: PartName) -> str:
+    """Return the name of a part's file, under which students know it."""
+    return _FILES.get(part, f"{part}.py")
 
 
 class Exchange(Protocol):
@@ -248,11 +258,23 @@ class AnswersFrom:
 
 
 @dataclass(frozen=True, slots=True)
-class OtherSource:
-    """A part has another text under the same file name."""
+class ChangedLine:
+    """One change in a line of a part, whose file keeps its name: ``old`` became ``new``, and ``text`` is the result.
+
+    ``direction`` is the sentence on a number that is too large or too small, if the change is of a number.
+    """
 
     part: PartName
+    line: int
+    old: str
+    new: str
     text: str = field(repr=False)
+    direction: str = ""
+
+    @property
+    def file(self) -> str:
+        """The name of the part's file."""
+        return get_part_file(self.part)
 
     @property
     def key(self) -> str:
@@ -275,31 +297,6 @@ class OtherSource:
             changed_agent: AgentSpec = replace(agent, code=SourceFile(agent.code.name, self.text))
             return replace(spec, agents={**spec.agents, self.part: changed_agent})
         return spec
-
-
-@dataclass(frozen=True, slots=True)
-class ChangedLine:
-    """One change in a line of a part: ``old`` became ``new``, and ``text`` is the result.
-
-    ``direction`` is the sentence on a number that is too large or too small, if the change is of a number.
-    """
-
-    part: PartName
-    file: str
-    line: int
-    old: str
-    new: str
-    text: str = field(repr=False)
-    direction: str = ""
-
-    @property
-    def key(self) -> str:
-        """The text that identifies the exchange."""
-        return OtherSource(self.part, self.text).key
-
-    def apply(self, spec: TrialSpec) -> TrialSpec:
-        """Return the trial with the ingredient replaced."""
-        return OtherSource(self.part, self.text).apply(spec)
 
 
 def draw_other_seed(seed: int, stream: str, number: int) -> int:

@@ -32,7 +32,7 @@ def add_causes(
     budget: Budget = DEFAULT_BUDGET,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> Grade:
-    """Return the grade with the causes of its lost marks.
+    """Return the grade with the causes of its lost marks; without them if the assignment wants none.
 
     Args:
         grade: The grade of ``submission``, by ``assignment`` and ``secret``.
@@ -51,7 +51,8 @@ def add_causes(
         HostError: The machine failed.
     """
     plan = plan_run(submission, assignment, secret)
-    if not grade.trials or grade.marks >= grade.max_marks or assignment.training is not None:
+    has_lost_marks = grade.trials and grade.marks < grade.max_marks
+    if not has_lost_marks or not assignment.reruns.causes or assignment.training is not None:
         return grade
     runner.start_zygotes(plan.processes)
     given_plan: RunPlan | None = None

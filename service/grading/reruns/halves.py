@@ -71,24 +71,29 @@ def decide_losing_parts(reruns: Sequence[Rerun], criterion: str) -> tuple[PartNa
     These are the parts each of which the reference's replaces without loss. If there are none, these are the parts that
     still lose marks beside the reference's other parts. Reruns with other exchanges are left out.
     """
-    reruns = [rerun for rerun in reruns if all(isinstance(each, GivenPart) for each in rerun.exchanges)]
-    given_parts = [tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart)) for rerun in reruns]
-    parts = tuple(dict.fromkeys(part for given in given_parts for part in given))
-    losing = tuple(
-        given[0]
-        for given, rerun in zip(given_parts, reruns, strict=True)
-        if len(given) == 1 and rerun.passes(criterion)
-    )
+    part_reruns = list_part_reruns(reruns)
+    parts = tuple(dict.fromkeys(part for given, _ in part_reruns for part in given))
+    losing = tuple(given[0] for given, rerun in part_reruns if len(given) == 1 and rerun.passes(criterion))
     if losing:
         return losing
     own_parts = {
         part
-        for given, rerun in zip(given_parts, reruns, strict=True)
+        for given, rerun in part_reruns
         if len(given) == len(parts) - 1 and rerun.loses(criterion)
         for part in parts
         if part not in given
     }
     return tuple(part for part in parts if part in own_parts)
+
+
+def list_part_reruns(reruns: Sequence[Rerun]) -> list[tuple[tuple[PartName, ...], Rerun]]:
+    """Return the reruns in which only parts are the reference's, each with these parts."""
+    part_reruns = []
+    for rerun in reruns:
+        given = tuple(each.part for each in rerun.exchanges if isinstance(each, GivenPart))
+        if given and len(given) == len(rerun.exchanges):
+            part_reruns.append((given, rerun))
+    return part_reruns
 
 
 def find_first_difference(own: Recording, other: Recording) -> int | None:

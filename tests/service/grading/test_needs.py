@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from assignment_texts import build_run_text
 from judging import START, criterion, lines, recorded
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge import judge
@@ -62,39 +63,10 @@ def test_students_read_the_reason_also_if_trials_are_hidden() -> None:
     assert "less than half" in shown.message
 
 
-_TEXT = """\
-id = "task"
-title = "T"
-[parts]
-responder = "none"
-[[scenario]]
-id = "run"
-poses = [[200, 800, 0]]
-seconds = 4
-[[criterion]]
-id = "ends"
-title = "Ends"
-marks = 2
-check = "finishes"
-{}
-[[criterion]]
-id = "says"
-title = "Says it"
-marks = 3
-check = "says"
-equals = "now"
-{}
-[[criterion]]
-id = "seen"
-title = "Is seen"
-marks = 0
-check = "says"
-equals = "now"
-"""
-
-
 def _read(folder: Path, of_ends: str, of_says: str) -> Assignment:
-    (folder / "assignment.toml").write_text(_TEXT.format(of_ends, of_says))
+    says = f'id = "says"\ntitle = "Says it"\nmarks = 3\ncheck = "says"\nequals = "now"\n{of_says}\n'
+    seen = 'id = "seen"\ntitle = "Is seen"\nmarks = 0\ncheck = "says"\nequals = "now"\n'
+    (folder / "assignment.toml").write_text(build_run_text("task", says, seen, ends=of_ends))
     return read_assignment(folder)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from assignment_texts import build_run_text
 from command import robomark
 from service.grading.answer_guesses import build_reply, collect_guesses
 from service.grading.example_check import CheckedAssignment
@@ -16,34 +17,12 @@ from service.grading.no_effort import NoEffortResult, build_submissions, grade_w
 from service.grading.trial_runner import TrialRunner
 from submissions.assignment.reader import find_assignment, read_assignment
 
-_GENEROUS = """\
-id = "generous"
-title = "Say the number"
-[parts]
-responder = "none"
-[[scenario]]
-id = "run"
-poses = [[200, 800, 0], [200, 500, 0], [200, 300, 0]]
-seconds = 4
-[[criterion]]
-id = "ends"
-title = "Ends"
-marks = 2
-check = "finishes"
-[[criterion]]
-id = "says"
-title = "Says it"
-marks = 3
-check = "reports"
-source = "speech"
-expected = [[4], [7], [4]]
-[[criterion]]
-id = "turns"
-title = "Turns round"
-marks = 1
-check = "displacement"
-turn = [170, 190]
-"""
+_GENEROUS = build_run_text(
+    "generous",
+    'id = "says"\ntitle = "Says it"\nmarks = 3\ncheck = "reports"\nsource = "speech"\nexpected = [[4], [7], [4]]\n',
+    'id = "turns"\ntitle = "Turns round"\nmarks = 1\ncheck = "displacement"\nturn = [170, 190]\n',
+    poses="[[200, 800, 0], [200, 500, 0], [200, 300, 0]]",
+)
 _STRICT = """\
 id = "strict"
 title = "Answer the question"

@@ -109,7 +109,7 @@ CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
         reruns(st.builds(lambda numbers: (WithoutMessageLoss(numbers),), st.frozensets(st.integers(1, 9), min_size=1))),
     ),
     "chance": st.builds(tuple, st.lists(reruns(st.just((OtherNoise(1),))), min_size=1, max_size=5)),
-    "line": st.tuples(reruns(st.just((ChangedLine("program", "robot.py", 8, "<", ">", "", "It is too short."),)))),
+    "line": st.tuples(reruns(st.just((ChangedLine("program", 8, "<", ">", "", "It is too short."),)))),
     "time": st.tuples(reruns(st.just((MoreTime(),)))),
     "start": st.tuples(reruns(st.just((VisibleStart(Pose(1, 2, 3), 0),)))),
     "mildest": mildest(),

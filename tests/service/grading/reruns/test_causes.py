@@ -81,6 +81,8 @@ def test_budget_ends_the_reruns_and_marks_do_not_change(runner: TrialRunner) -> 
     few = add_causes(graded, submission, assignment, runner, reference=reference, budget=Budget(runs=0))
     assert few.causes == ()
     assert few == graded
+    without_causes = replace(assignment, reruns=Reruns(causes=False))
+    assert add_causes(graded, submission, without_causes, runner, reference=reference).causes == ()
 
 
 def test_lost_messages_are_the_cause_for_a_program_that_sends_once(runner: TrialRunner) -> None:

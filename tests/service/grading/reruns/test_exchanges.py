@@ -12,11 +12,11 @@ from responders.sandbox.running_child import ChildLimits
 from responders.source_file import SourceFile
 from responders.trial_spec import EarlierAnswer, ProgramSpec, ResponderSpec, TrialSpec
 from service.grading.reruns.exchanges import (
+    ChangedLine,
     Exchange,
     MoreTime,
     OtherDraw,
     OtherNoise,
-    OtherSource,
     OtherStart,
     VisibleStart,
     WithoutChannelEffect,
@@ -64,8 +64,8 @@ SPEC = TrialSpec(
         (WithoutChannelEffect("corruption"), "channel"),
         (VisibleStart(Pose(1, 2, 3), 0), "pose"),
         (MoreTime(), "seconds"),
-        (OtherSource("program", "say('b')"), "program"),
-        (OtherSource("responder", "x = 1"), "responder"),
+        (ChangedLine("program", 1, "a", "b", "say('b')"), "program"),
+        (ChangedLine("responder", 1, "", "", "x = 1"), "responder"),
     ],
     ids=lambda each: getattr(each, "key", each),
 )
