@@ -146,9 +146,10 @@ def load_report_style() -> str:
 
 @lru_cache(maxsize=1)
 def load_report_script() -> str:
-    """Return the replay script of all reports: its files in order of name, wrapped in one function scope."""
-    folder = files("service.reports.replay").joinpath("component")
-    parts = sorted((each for each in folder.iterdir() if each.name.endswith(".js")), key=lambda each: each.name)
+    """Return the replay script of all reports: the component's files in order of name, then its start on a page."""
+    folder = files("service.reports.replay")
+    component = sorted(each.name for each in folder.joinpath("component").iterdir() if each.name.endswith(".js"))
+    parts = [*(folder.joinpath("component", name) for name in component), folder.joinpath("page.js")]
     code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
     return f'\n(() => {{\n"use strict";\n{code}}})();\n'
 

@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from html.parser import HTMLParser
-from importlib.resources import files
 from typing import Any
 
 import pytest
@@ -18,7 +17,7 @@ from service.grading.grade import Grade
 from service.grading.judging.message_parts import add_hidden_note
 from service.language import Language, load_language
 from service.message_catalogue import extract_messages
-from service.reports.html import render_report_page
+from service.reports.html import load_report_script, render_report_page
 from service.reports.plots.grade_plots import list_plots
 from service.reports.view import View, build_staff_view, build_student_view
 
@@ -134,8 +133,7 @@ def test_a_german_report_is_german() -> None:
 
 
 def test_the_script_of_a_replay_asks_for_all_the_words_that_there_are_and_no_others() -> None:
-    folder = files("service.reports.replay").joinpath("component")
-    code = "".join(each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name.endswith(".js"))
+    code = load_report_script()
     words = island_of(page_of(build_student_view(line_follower_grade())))["words"]
     literals = set(re.findall(r'"(\w+)"', code))
     assert set(re.findall(r'\bsay\("(\w+)"', code)) <= set(words["sentences"]) <= literals

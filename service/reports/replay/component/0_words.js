@@ -1,10 +1,4 @@
-// The texts of the replay, from the data of the page and in its language. These files contain no texts.
-
-const WORDS = wordsOf(document.querySelector("section.replay > script"));
-
-function wordsOf(island) {
-  return island ? JSON.parse(island.textContent).words : null;
-}
+// The texts of the replay in the reader's language. These files contain no texts: whoever shows the component defines WORDS.
 
 // Returns a sentence with its placeholders filled in: "%(seconds)s of %(all)s".
 function say(name, parts = {}) {
@@ -17,5 +11,5 @@ function worded(table, name) {
 }
 
 function whole(number) {
-  return number.toLocaleString(document.documentElement.lang);
+  return number.toLocaleString(document.documentElement.lang || undefined);
 }

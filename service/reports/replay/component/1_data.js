@@ -3,8 +3,8 @@
 const VERSION = 1;
 const ALMOST = 1e-6;
 
-async function unpack(packed) {
-  const bytes = Uint8Array.from(atob(packed), (character) => character.charCodeAt(0));
+// Returns a replay from its compressed bytes.
+async function unpack(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const replay = JSON.parse(await new Response(stream).text());
   if (replay.version !== VERSION) throw new Error(say("version", { found: replay.version, expected: VERSION }));

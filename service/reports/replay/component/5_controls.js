@@ -1,4 +1,4 @@
-// The controls: one slider for one trial, by mouse, touch, keyboard and links; and the start of the replay.
+// The controls: one slider for one trial, by mouse, touch, keyboard and links.
 
 const SPEEDS = [[0.25, "¼×"], [0.5, "½×"], [1, "1×"], [2, "2×"], [5, "5×"], [10, "10×"], [20, "20×"], [50, "50×"]];
 const VIEWS = [["path", "path"], ["floor", "whole"], ["near", "near"]]; // mode and key of its text
@@ -70,12 +70,6 @@ class ReplayControls {
     this.trialChoice.addEventListener("change", () => this.open(this.byNumber(this.trialChoice.value), 0));
     this.root.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    window.addEventListener("hashchange", () => this.follow(location.hash));
-    document.addEventListener("click", (event) => {
-      const link = event.target instanceof Element && event.target.closest("a[href^='#']");
-      if (link && link.hash === location.hash) this.follow(link.hash);
-    });
-    this.follow(location.hash);
   }
 
   byNumber(number) {
@@ -203,16 +197,8 @@ class ReplayControls {
   }
 }
 
-async function startReplay(section) {
-  const root = section.querySelector(".component");
-  try {
-    const replay = await unpack(JSON.parse(section.querySelector("script").textContent).deflated);
-    for (const floor of replay.floors) floor.loaded = await loadedImage(floor.image);
-    if (replay.trials.length) new ReplayControls(replay, root);
-    section.dataset.ready = String(Math.round(performance.now()));
-  } catch (error) {
-    root.replaceChildren(element("p", {}, say("cannotBeShown", { error: error.message })));
-  }
+// Shows an unpacked replay in an element. Returns its controls, or null if it has no trials.
+async function showReplay(replay, root) {
+  for (const floor of replay.floors) floor.loaded = await loadedImage(floor.image);
+  return replay.trials.length ? new ReplayControls(replay, root) : null;
 }
-
-document.querySelectorAll("section.replay").forEach(startReplay);
