@@ -6,7 +6,8 @@ There is no widget and no browser here; what only shows something does nothing.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable
+import types
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from nbev3devsim.tqdma import tqdm_notebook, tqdma
@@ -27,6 +28,45 @@ class RoboSim:
         self.look: Callable[[], dict[str, Any]] = dict
         self._rows: dict[tuple[str, str], tuple[str, ...]] = {}  # of each entry and mode, as image_data has it
         self.live_image_handler: Callable[[int], Any] | None = None
+        self._elements: dict[str, Any] = {}
+
+    def find_responder(self, namespace: Mapping[str, Any]) -> Callable[[str], Any]:
+        """Return ``pyresponder``, else ``responder`` or the only ``*_responder`` in the namespace.
+
+        Raises:
+            LookupError: There is none, or more than one.
+        """
+        if callable(self.pyresponder):
+            return self.pyresponder
+        if self.pyresponder is not None:
+            kind = type(self.pyresponder).__name__
+            raise LookupError(f"roboSim.pyresponder is a {kind} and no function: assign the function without brackets")
+        if callable(namespace.get("responder")):
+            return namespace["responder"]  # type: ignore[no-any-return]
+        functions = {
+            name: value
+            for name, value in namespace.items()
+            if name.endswith("_responder") and isinstance(value, types.FunctionType)
+        }
+        if len(functions) == 1:
+            return next(iter(functions.values()))
+        if functions:
+            raise LookupError(
+                f"which of {', '.join(functions)} is the responder? assign one of them to roboSim.pyresponder"
+            )
+        raise LookupError(
+            "there is no responder: define a function called responder, or assign one to roboSim.pyresponder"
+        )
+
+    def ask(self, responder: Callable[[str], Any], text: str) -> Any:
+        """Return the responder's answer: its value, or the element ``response`` if it sets that and returns None."""
+        self._elements.pop("response", None)
+        answer = responder(text)
+        return self._elements.pop("response", None) if answer is None else answer
+
+    def set_element(self, name: str, value: Any) -> None:
+        """Set an element of the widget. Only ``response`` has an effect: it is the answer to the robot's message."""
+        self._elements[name] = value
 
     def process_raw_image_data(self, raw_data: str, mode: str = "rgb", to_str: bool = True) -> str | list[str]:
         """Return the sensor values without alpha: red only for greyscale, 0 or 1 for ``bw``."""

@@ -107,35 +107,17 @@ class ResponderRole:
             if not callable(self._namespace.get(self._function)):
                 raise LookupError(f"there is no function called {self._function}")
             return self._namespace[self._function]  # type: ignore[no-any-return]
-        if callable(roboSim.pyresponder):
-            return roboSim.pyresponder
-        if roboSim.pyresponder is not None:
-            kind = type(roboSim.pyresponder).__name__
-            raise LookupError(f"roboSim.pyresponder is a {kind} and no function: assign the function without brackets")
-        if callable(self._namespace.get("responder")):
-            return self._namespace["responder"]  # type: ignore[no-any-return]
-        functions = {
-            name: value
-            for name, value in self._namespace.items()
-            if name.endswith("_responder") and isinstance(value, types.FunctionType)
-        }
-        if len(functions) == 1:
-            return next(iter(functions.values()))
-        if functions:
-            raise LookupError(
-                f"which of {', '.join(functions)} is the responder? assign one of them to roboSim.pyresponder"
-            )
-        raise LookupError(
-            "there is no responder: define a function called responder, or assign one to roboSim.pyresponder"
-        )
+        return roboSim.find_responder(self._namespace)
 
     def _answer_text(self, text: str) -> Frame:
+        from nbev3devsim.load_nbev3devwidget import roboSim
+
         if not self._defines_msg:
             self._namespace["msg"] = text
         self._wrap_functions()
         self._stack, self._calls = ["responder"], 0
         try:
-            answer = self._find_function()(text)
+            answer = roboSim.ask(self._find_function(), text)
         except BaseException as error:
             return {"do": "answer", "kind": "error", "error": self._files.describe_error(error)}
         if not isinstance(answer, str):

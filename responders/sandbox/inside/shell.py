@@ -18,13 +18,14 @@ _ROBOT_MAGICS = ("sim_magic", "sim_magic_imports", "sim_magic_preloaded")
 #: Magics whose cells the report draws as diagrams.
 _DIAGRAM_MAGICS = frozenset(("blockdiag", "seqdiag"))
 _UNSUPPORTED_DIAGRAM_MAGICS = frozenset(("actdiag", "nwdiag", "packetdiag", "rackdiag"))
-#: Magics that only set up or show something in a browser.
+#: Magics that only set up or show something in a browser, or ask for a check or a submission.
 _IGNORED_MAGICS = frozenset(
     (
         *("load_ext", "reload_ext", "unload_ext", "matplotlib", "pylab", "config", "autoreload", "precision", "xmode"),
         *("colors", "autosave", "alias_magic", "pinfo", "pdoc", "psource"),
         *("who", "who_ls", "whos", "hist", "history", "lsmagic", "magic", "quickref", "pdef", "pfile", "pinfo2", "pdb"),
         *("html", "HTML", "javascript", "js", "markdown", "latex", "svg", "SVG"),
+        "robomark",
     )
 )
 _PROGRAM_MAGICS = frozenset(
