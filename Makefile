@@ -83,6 +83,7 @@ pictures: setup
 
 wheel: setup
 	$(BIN)/python -m hatchling build -t wheel
+	cd notebook && ../$(BIN)/python -m hatchling build -t wheel -d ../dist
 
 # Needs docker or podman.
 CONTAINERS := $(shell which docker podman 2>/dev/null | head -n 1)

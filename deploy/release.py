@@ -1,4 +1,4 @@
-"""Releases a version: checks the tree and the changelog, builds the wheel and source archive twice, sets the tag.
+"""Releases a version: checks the tree and the changelog, builds the wheels and source archive twice, sets the tag.
 
 ``make release`` runs it. ``make release-check`` does the same without the tag and the image. It needs git, and builds
 the image only if docker or podman is installed.
@@ -97,9 +97,9 @@ def run_checks(root: Path) -> None:
 
 
 def build_twice(root: Path, into: Path) -> list[Path]:
-    """Build the wheel and the source archive of the last commit in ``into``.
+    """Build the wheel, the source archive and the notebook's wheel of the last commit in ``into``.
 
-    Both are built twice, from copies in two folders.
+    All are built twice, from copies in two folders.
 
     Raises:
         NotReady: If the bytes differ.
@@ -152,9 +152,11 @@ def _build(root: Path, folder: Path) -> list[Path]:
     shutil.unpack_archive(archive, tree, filter="data")
     environment = os.environ | {"SOURCE_DATE_EPOCH": _run(root, "git", "log", "-1", "--format=%ct")}
     command = [sys.executable, "-m", "hatchling", "build", "--directory", str(built)]
-    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise NotReady(f"the build fails:\n{done.stderr}")
+    projects = [(tree, command), (tree / "notebook", [*command, "--target", "wheel"])]
+    for project, build in [each for each in projects if each[0].is_dir()]:
+        done = subprocess.run(build, cwd=project, env=environment, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise NotReady(f"the build fails:\n{done.stderr}")
     return sorted(built.iterdir())
 
 

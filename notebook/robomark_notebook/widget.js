@@ -1,0 +1,34 @@
+// Shows a replay in a notebook. The component's files and WORDS come before this file.
+
+async function render({ model, el }) {
+  const report = element("div");
+  const root = element("div", { className: "component" });
+  const section = element("section", { className: "replay" }, root);
+  // Otherwise JupyterLab takes the arrow keys for its own.
+  const frame = element("div", { className: "robomark", "data-lm-suppress-shortcuts": "true" }, report, section);
+  report.innerHTML = model.get("report"); // escaped where it is made
+  el.append(frame);
+  try {
+    const bytes = model.get("replay");
+    const controls = bytes.byteLength ? await showReplay(await unpack(bytes), root) : null;
+    section.hidden = !controls;
+    if (controls) followLinks(frame, controls);
+    frame.dataset.ready = "true";
+  } catch (error) {
+    root.replaceChildren(element("p", {}, say("cannotBeShown", { error: error.message })));
+  }
+}
+
+// Links to moments move the replay of this output, and not the page.
+function followLinks(frame, controls) {
+  controls.link.hidden = true;
+  for (const button of frame.querySelectorAll("button.watch")) button.hidden = false;
+  frame.addEventListener("click", (event) => {
+    const link = event.target.closest("a[href^='#'], button.watch");
+    if (!link) return;
+    event.preventDefault();
+    controls.follow(link.dataset.moment ?? link.hash);
+  });
+}
+
+export default { render };
