@@ -52,18 +52,27 @@ def draw_last_frame(replay: Mapping[str, Any]) -> bytes | None:
 
 
 class _Frame:
-    """The visible part of the floor: all of the paths, with a margin."""
+    """The visible part of the floor: all of the paths, with a margin, and as little beyond the floor as possible."""
 
     def __init__(self, points: Sequence[Point]) -> None:
         xs, ys = zip(*points, strict=True)
         width = max(max(xs) - min(xs) + 2 * _MARGIN, (max(ys) - min(ys) + 2 * _MARGIN) * _WIDTH / _HEIGHT, _LEAST_WIDTH)
         self.scale = _WIDTH * _OVERSAMPLING / width
-        self._left = (max(xs) + min(xs) - width) / 2
-        self._top = (max(ys) + min(ys) + width * _HEIGHT / _WIDTH) / 2
+        height = width * _HEIGHT / _WIDTH
+        self._left = _find_first_edge(xs, width, _FLOOR_WIDTH)
+        self._top = _find_first_edge(ys, height, _FLOOR_HEIGHT) + height
 
     def place(self, x: float, y: float) -> Point:
         """Return the pixel of a place on the floor."""
         return (x - self._left) * self.scale, (self._top - y) * self.scale
+
+
+def _find_first_edge(coordinates: Sequence[float], length: float, floor_length: float) -> float:
+    """Return where a view of this length begins: with the path in its middle, or moved towards the floor."""
+    least, most = min(coordinates), max(coordinates)
+    first, last = sorted((0.0, floor_length - length))
+    edge = (least + most - length) / 2
+    return max(min(edge, max(last, most + _MARGIN - length)), min(first, least - _MARGIN))
 
 
 def _read_path(robot: Mapping[str, Any]) -> list[Point]:
