@@ -20,8 +20,8 @@ import numpy as np
 from benchmarks.graded_store import build_short_request
 from benchmarks.measurement import EXPONENT, Measurement, measure_cpu_seconds
 from responders.source_file import SourceFile
+from service.grading.class_statistics import PASS_SHARE
 from service.grading.grader import grade
-from service.grading.pass_mark import PASS_SHARE
 from service.grading.trial_runner import TrialRunner
 from service.plotting import draw_plots
 from service.reports.html import render_report_page

@@ -12,8 +12,7 @@ from dataclasses import replace
 
 from sim.errors import UsageError
 from submissions.diagram import ActorGroup, ArrowHeads, Diagram, DiagramActor, DiagramArrow, DiagramKind, Divider
-from submissions.diagram_tokens import DiagramToken, build_error, tokenize
-from submissions.diagram_vocabulary import (
+from submissions.diagram_tokens import (
     ACTOR_ATTRIBUTES,
     ARROW_ATTRIBUTES,
     ARROWS,
@@ -23,7 +22,10 @@ from submissions.diagram_vocabulary import (
     GROUP_ATTRIBUTES,
     LINE_STYLES,
     SHAPES,
+    DiagramToken,
+    build_error,
     suggest_word,
+    tokenize,
 )
 
 MAX_ACTORS = 16

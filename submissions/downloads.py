@@ -10,7 +10,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+from sim.errors import UsageError
+from sim.readers.reader_errors import UnreadableDataError
 from submissions.raw_files import sanitise_name
 from submissions.student_identity import HIDDEN_NAME, UNKNOWN_STUDENT, Student, make_unique_ids
 
@@ -105,9 +108,6 @@ def _read_moodle(matches: Mapping[Path, re.Match[str]]) -> Iterator[DownloadedFi
 
 def _read_gradescope(folder: Path, entries: Sequence[Path]) -> Iterator[DownloadedFiles]:
     """Yield a row for each student of a joint submission."""
-    # Imported here, because only Gradescope exports need it.
-    from submissions.gradescope_list import read_gradescope_list
-
     submissions = read_gradescope_list(folder / _GRADESCOPE_LIST)
     folder_names = [entry.name for entry in entries if _is_folder(entry)]
     for name in dict.fromkeys([*submissions, *folder_names]):
@@ -186,3 +186,26 @@ def _is_folder(path: Path) -> bool:
 def _read_beginning(path: Path) -> str:
     with path.open("rb") as stream:
         return stream.read(100).decode("utf-8", "replace").strip()
+
+
+def read_gradescope_list(path: Path) -> dict[str, Any]:
+    """Return the submissions by folder from the list in a Gradescope export.
+
+    All values are texts; YAML tags and merge keys have no effect.
+
+    Raises:
+        UsageError: The file is not such a list.
+    """
+    # Only Gradescope's lists are YAML.
+    from sim.readers.yaml_text import MAX_BYTES, read_yaml
+
+    try:
+        with path.open("rb") as stream:
+            submissions = read_yaml(stream.read(MAX_BYTES + 1))
+    except OSError as error:
+        raise UsageError(f"{path.name}: cannot be read: {error.strerror}.") from None
+    except UnreadableDataError as error:
+        raise UsageError(f"{path.name}: cannot be read: {error}, expected the file exported from Gradescope.") from None
+    if not isinstance(submissions, dict):
+        raise UsageError(f"{path.name}: is not a list of submissions, expected the file exported from Gradescope.")
+    return {name: own for name, own in submissions.items() if isinstance(name, str)}

@@ -21,8 +21,7 @@ from service.commands.nearest_numbers import (
     search_lost_criteria,
 )
 from service.commands.options import apply_channel_flags
-from service.commands.output import print_note, print_renderables
-from service.commands.sandbox_warning import warn_about_missing_sandbox
+from service.commands.output import print_note, print_renderables, warn_about_missing_sandbox
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.pools.drawing import PoolExtent

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.table import Table
 
+
 #: Version of the JSON documents. It changes when a key is removed or changes its meaning.
 SCHEMA = 1
 
@@ -116,3 +117,8 @@ def _to_plain_value(value: Any) -> Any:
     if is_dataclass(value):
         return {field.name: getattr(value, field.name) for field in fields(value)}
     raise TypeError(f"{type(value).__name__} cannot be written to a JSON document")
+
+
+def warn_about_missing_sandbox() -> None:
+    """Print the warning. ``--quiet`` does not suppress it."""
+    print("robomark: NO SANDBOX: these submissions can read and change all your files", file=sys.stderr)

@@ -17,9 +17,8 @@ from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
 from responders.sandbox.running_child import ChildLimits
 from service.commands.options import ChannelFlags, apply_channel_flags
-from service.commands.output import print_json, print_line, print_note
+from service.commands.output import print_json, print_line, print_note, warn_about_missing_sandbox
 from service.commands.run_options import MagicFlags, OutputFiles, RunConditions, TickLength
-from service.commands.sandbox_warning import warn_about_missing_sandbox
 from service.grading.grade import TrialResult
 from service.grading.standalone_runs import (
     ProgramFile,

@@ -64,8 +64,8 @@ def verify_file(path: Path, options: VerificationOptions) -> None:
 
 
 def _read_keys(path: Path | None) -> tuple[PublicKey, ...]:
-    from service.statements.keys_document import MAX_FILE_BYTES as MAX_KEYS_BYTES
-    from service.statements.keys_document import parse_keys
+    from service.statements.keys import MAX_FILE_BYTES as MAX_KEYS_BYTES
+    from service.statements.keys import parse_keys
 
     if path is None:
         return ()

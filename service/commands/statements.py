@@ -90,7 +90,7 @@ def list_keys(
 ) -> None:
     """List the public keys of statements."""
     from service.operations import statements
-    from service.statements.keys_document import build_keys_document, dump_keys
+    from service.statements.keys import build_keys_document, dump_keys
 
     with open_installation() as (service, _):
         lines = statements.list_keys(service)

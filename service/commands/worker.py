@@ -16,7 +16,7 @@ def worker(
 ) -> None:
     """Start a worker, which grades queued jobs. Starts the bundled broker if no other is configured or running."""
     from responders.sandbox import control_group
-    from service.commands.sandbox_warning import warn_about_missing_sandbox
+    from service.commands.output import warn_about_missing_sandbox
     from service.queue.broker import EmbeddedBroker
     from service.queue.logs import configure_logging
     from service.queue.worker import run_worker

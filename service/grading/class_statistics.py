@@ -18,6 +18,8 @@ from sim.sentences import Sentence
 if TYPE_CHECKING:
     from service.grading.grade import Grade
 
+#: The default pass mark, as a fraction of all marks.
+PASS_SHARE = Decimal("0.4")
 _BINS, _MAX_BINS = 10, 15
 _HUNDREDTH = Decimal("0.01")
 

@@ -11,8 +11,7 @@ from service.grading.findings import ReportedFault
 from service.grading.hint_amounts import describe_large_amount, describe_passed_amount
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
-from service.grading.hint_discarded_values import describe_discarded_value, suggest_correct_statement
-from service.grading.hint_structure import has_motor_call
+from service.grading.hint_structure import describe_discarded_value, has_motor_call, suggest_correct_statement
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES, READINGS
 from service.grading.judging.message_parts import add_place
 from service.language import translatable

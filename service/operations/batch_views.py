@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from sqlalchemy.orm import Session
 
-from service.grading.class_statistics import AssignmentStatistics, compute_statistics
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE, AssignmentStatistics, compute_statistics
 from service.grading.ranks import RankTable
 from service.operations.context import Actor, Service
 from service.operations.lookup import (

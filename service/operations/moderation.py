@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from service.batch_rows import describe_missing_grade
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.language import ENGLISH, Language
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid, NotFound

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from sqlalchemy.orm import Session
 
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.operations.batches import load_course_assignment
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict

@@ -20,8 +20,7 @@ from service.operations.lookup import (
 )
 from service.statements.envelopes import Envelope
 from service.statements.facts import FactKind
-from service.statements.keys import PublicKey
-from service.statements.keys_document import KeyLine
+from service.statements.keys import KeyLine, PublicKey
 from service.statements.merkle_tree import build_inclusion_proof, compute_root
 from service.statements.statement import PredicateType, format_moment, sign_statement
 from service.statements.statement_file import LogPlace, StatementFile

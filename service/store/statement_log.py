@@ -16,8 +16,7 @@ from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session
 
 from service.statements.envelopes import Envelope
-from service.statements.keys import SigningKey, generate_signing_key, parse_public_key
-from service.statements.keys_document import KeyLine
+from service.statements.keys import KeyLine, SigningKey, generate_signing_key, parse_public_key
 from service.statements.statement import (
     PAYLOAD_TYPE,
     Change,

@@ -7,6 +7,7 @@ which objects exist. ``reports/view.py`` decides which parts of a grade a reader
 from __future__ import annotations
 
 import hmac
+import re
 import secrets
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -20,13 +21,22 @@ from service.operations.context import Actor
 from service.operations.sign_in import Identity
 from service.operations.types import CredentialKind, Role
 from service.web.context import Context
-from service.web.page_scopes import find_page_scope
 from sim.errors import RobomarkError
 
 SESSION_COOKIE = "robomark"
 CSRF_FIELD = "csrf"
 CSRF_HEADER = "x-csrf-token"
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+#: Pages that every session may open, and signing out.
+_FOR_EVERY_SESSION = frozenset({"GET /", "GET /account", "POST /sign-out"})
+#: Scopes of routes that change something, by a pattern in the route. The first match counts.
+_CHANGES = (
+    (re.compile(r"^/account/"), "sign-in"),
+    (re.compile(r"/worksheet$"), "read"),
+    (re.compile(r"/(grades|appeals)/|/(publish|regrade)$"), "mark"),
+    (re.compile(r"^/operator|/(assignments|people|platform|policy)(/|$)"), "manage"),
+    (re.compile(""), "submit"),
+)
 #: Row numbers and names in paths, queries and forms, limited to values that every database accepts.
 HIGHEST_NUMBER = 2**31 - 1
 RowNumber = Annotated[int, Path(ge=1, le=HIGHEST_NUMBER)]
@@ -201,3 +211,12 @@ def _require_operator(reader: SignedInReader) -> Reader:
 CourseInstructor = Annotated[ReaderInCourse, Depends(_require_instructor)]
 CourseStudent = Annotated[ReaderInCourse, Depends(_require_student)]
 OperatorReader = Annotated[Reader, Depends(_require_operator)]
+
+
+def find_page_scope(method: str, route: str) -> str | None:
+    """Return the scope for a method and a route such as ``/courses/{course_id}/batches``, or None if none is needed."""
+    if f"{method} {route}" in _FOR_EVERY_SESSION:
+        return None
+    if method in ("GET", "HEAD"):
+        return "read"
+    return next(scope for pattern, scope in _CHANGES if pattern.search(route))

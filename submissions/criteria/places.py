@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from sim.floors.centrelines import load_centrelines
+from sim.floors.tracks import load_centrelines
 from submissions.strict_table import Entries, StrictTable, TableMistake
 
 #: The measured point: the middle of the axle, the pen's drawing, or a light sensor.

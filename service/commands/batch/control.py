@@ -8,7 +8,7 @@ import typer
 
 from service.commands.installation import open_installation
 from service.commands.output import print_json, print_line
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from sim.errors import UsageError
 
 BatchId = Annotated[str, typer.Argument(help="The batch's id, or its first characters.")]

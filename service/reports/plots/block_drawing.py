@@ -1,6 +1,6 @@
 """Drawing of block diagrams: one box per actor, with arrows between them.
 
-``block_layout.py`` assigns the levels. This module draws any diagram.
+Blocks further along the arrows are further along the page: positions are levels, and rows across them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 from matplotlib.figure import Figure
 
-from service.reports.plots.block_layout import compute_layout
 from service.reports.plots.diagram_parts import (
     CHARACTERS,
     LINE_HEIGHT,
@@ -175,3 +174,34 @@ def _place_label(start: Point, end: Point, bend: float, lines: tuple[str, ...]) 
     half_size = max(map(len, lines)) / CHARACTERS / 2, LINE_HEIGHT * len(lines) / 2
     distance = abs(normal_x) * half_size[0] + abs(normal_y) * half_size[1] + 0.04
     return x + normal_x * distance, y + normal_y * distance
+
+
+@dataclass(frozen=True, slots=True)
+class BlockPosition:
+    """The level of a block, from 0, and its row: 0 is the middle, with as many before as after it."""
+
+    level: int
+    row: float
+
+
+def compute_layout(diagram: Diagram) -> Mapping[str, BlockPosition]:
+    """Return a position for each actor. Arrows count in the order of the text, whatever their direction."""
+    arrow_names = [name for arrow in diagram.arrows for name in (arrow.source, arrow.target)]
+    order = {
+        name: number for number, name in enumerate(dict.fromkeys([*arrow_names, *(a.name for a in diagram.actors)]))
+    }
+    group_numbers = {name: number for number, each in enumerate(diagram.groups) for name in each.members}
+    levels = dict.fromkeys(order, 0)
+    pairs = sorted({tuple(sorted((order[a.source], order[a.target]))) for a in diagram.arrows if a.source != a.target})
+    names = list(order)
+    for first_index, second_index in pairs:  # the levels of earlier actors are final
+        levels[names[second_index]] = max(levels[names[second_index]], levels[names[first_index]] + 1)
+    layout: dict[str, BlockPosition] = {}
+    for level in range(max(levels.values(), default=0) + 1):
+        level_names = sorted(
+            (name for name in order if levels[name] == level),
+            key=lambda name: (group_numbers.get(name, -1), order[name]),
+        )
+        for row, name in enumerate(level_names):
+            layout[name] = BlockPosition(level, row - (len(level_names) - 1) / 2)
+    return layout

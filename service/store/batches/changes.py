@@ -9,7 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Literal
 
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.store.states import ChangeStage, JobState, Standing
 
 

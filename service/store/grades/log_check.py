@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from service.statements.envelopes import Envelope
 from service.statements.facts import FactKind, OpenFact, commit_to_facts
-from service.statements.keys_document import KeyLine
+from service.statements.keys import KeyLine
 from service.statements.log_head import FiledHead
 from service.statements.merkle_tree import compute_root
 from service.statements.statement import PAYLOAD_TYPE, Change, Statement, format_moment, parse_statement

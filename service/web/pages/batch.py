@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
 
-from service.grading.pass_mark import PASS_SHARE
+from service.grading.class_statistics import PASS_SHARE
 from service.language import translatable
 from service.operations import batch_views as views
 from service.operations import batches as operations

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from service.operations import statements
-from service.statements.keys_document import dump_keys
+from service.statements.keys import dump_keys
 from service.web.access import CourseInstructor, CourseStudent, OptionalReader, RowName, RowNumber
 from service.web.attachments import respond_with_attachment
 from service.web.context import Context

@@ -19,8 +19,7 @@ from service.commands.statement_verification import VerificationOptions, verify_
 from service.grading.grader import grade
 from service.operations import statements
 from service.statements.facts import Fact, FactKind, commit_to_facts, open_fact
-from service.statements.keys import generate_signing_key
-from service.statements.keys_document import dump_keys
+from service.statements.keys import dump_keys, generate_signing_key
 from service.statements.statement import PredicateType, sign_statement
 from service.statements.statement_file import LogPlace, StatementFile, parse_statement_file
 from service.store.batches.intake import accept_batch

@@ -11,10 +11,10 @@ import pytest
 from paths import ROOT
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_differences import advise_on_difference
-from service.grading.hint_discarded_values import describe_discarded_value
 from service.grading.hint_passes import hint_about_kept_value, hint_about_stale_twin, hint_about_zero_pass
 from service.grading.hint_skipped_loops import describe_unbracketed_not
 from service.grading.hint_slips import collect_slips
+from service.grading.hint_structure import describe_discarded_value
 from submissions.criteria import Criterion
 from submissions.criteria.motion import Excursions
 

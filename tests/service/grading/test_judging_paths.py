@@ -23,7 +23,7 @@ from service.grading.judging.geometry import (
 from service.grading.judging.geometry import track_line_progress as along_line
 from service.grading.judging.line import Crossing, find_complete_laps
 from service.grading.judging.point import compute_rounds
-from sim.floors.centrelines import load_centrelines
+from sim.floors.tracks import load_centrelines
 from sim.recording import Pose, Touch
 from submissions.criteria.line import Laps
 from submissions.criteria.places import Area, LineToFollow

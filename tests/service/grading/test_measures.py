@@ -13,7 +13,7 @@ import pytest
 from driving import along, driven, rest, spin, straight
 from judging import judged
 from paths import ROOT
-from sim.floors.centrelines import load_centrelines
+from sim.floors.tracks import load_centrelines
 from sim.recording import DatalogEntry, Message, Recording, TimedText
 from submissions.criteria import SCHEMAS
 

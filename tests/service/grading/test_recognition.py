@@ -21,13 +21,12 @@ from paths import ROOT
 from responders.source_file import SourceFile
 from service.grading.grade import Accuracy, CriterionResult, TrialResult, VisibleFeedback
 from service.grading.grader import grade
-from service.grading.judging.class_scores import compute_class_scores
 from service.grading.judging.geometry import locate_part
 from service.grading.judging.judge import judge
 from service.grading.judging.label_patches import CODES, decode_label
 from service.grading.judging.true_labels import NO_IMAGE
 from service.grading.trial_runner import TrialRunner
-from service.reports.recognition_table import build_recognition_table
+from service.reports.recognition_table import build_recognition_table, compute_class_scores
 from service.reports.view import build_student_view
 from sim.floors import SHAPES
 from sim.recording import Fault, Image, Message, Pose, Recording, Ticks, Verdict

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from service.statements.envelopes import Envelope, parse_envelope, sign_payload
 from service.statements.facts import Fact, FactKind, commit_to_facts, open_fact
-from service.statements.keys import SigningKey, generate_signing_key, parse_public_key
-from service.statements.keys_document import KeyLine, dump_keys, parse_keys
+from service.statements.keys import KeyLine, SigningKey, dump_keys, generate_signing_key, parse_keys, parse_public_key
 from service.statements.log_head import build_filed_head, parse_filed_head
 from service.statements.merkle_tree import build_inclusion_proof, compute_root, hash_leaf
 from service.statements.statement import PredicateType, sign_statement

@@ -26,8 +26,7 @@ from service.store.people.reach import Reach
 from service.store.people.students import Students
 from service.store.states import CredentialKind, Role
 from service.store.tables.people import Credential, Enrolment, LtiCourse, LtiPerson
-from service.web.access import SESSION_COOKIE
-from service.web.page_scopes import find_page_scope
+from service.web.access import SESSION_COOKIE, find_page_scope
 from sim.errors import UsageError
 from submissions.student_identity import Student
 from web import Web, csrf, submit, words
