@@ -1,6 +1,6 @@
 """Sender of webhook deliveries: one thread in each web server, which claims deliveries from the outbox.
 
-``store/outbox.py`` defines the events and retries.
+``store/webhook_events.py`` defines the events and retries.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Self
 import structlog
 
 from service.outgoing_requests import Networks, RequestFailure, send_request
-from service.store import outbox
+from service.store import webhook_events
 from service.store.engine import Store
-from service.store.outbox import ClaimedDelivery
+from service.store.webhook_events import ClaimedDelivery
 from service.version import GRADER_VERSION
 
 _log = structlog.get_logger(__name__)
@@ -65,7 +65,7 @@ class WebhookSender:
 
 def start_due_deliveries(store: Store, allowlist: Networks, pool: Executor, limit: int) -> set[Future[None]]:
     """Start to send up to ``limit`` due deliveries, and return their futures."""
-    deliveries = outbox.claim_deliveries(store, limit) if limit > 0 else []
+    deliveries = webhook_events.claim_deliveries(store, limit) if limit > 0 else []
     return {pool.submit(_send_delivery, store, each, allowlist) for each in deliveries}
 
 
@@ -97,9 +97,9 @@ def _send_and_record(store: Store, delivery: ClaimedDelivery, allowlist: Network
     try:
         status = send_request(delivery.url, method="POST", body=body, headers=headers, allowlist=allowlist).status
     except RequestFailure as error:
-        outbox.record_failure(store, delivery, str(error))
+        webhook_events.record_failure(store, delivery, str(error))
         return
     if 200 <= status < 300:
-        outbox.record_delivery(store, delivery)
+        webhook_events.record_delivery(store, delivery)
     else:
-        outbox.record_failure(store, delivery, f"answered {status}, expected 200 or another of 2xx")
+        webhook_events.record_failure(store, delivery, f"answered {status}, expected 200 or another of 2xx")

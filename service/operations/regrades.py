@@ -13,7 +13,7 @@ from service.operations.batches import load_course_assignment
 from service.operations.context import Actor, Service
 from service.operations.errors import Conflict
 from service.operations.lookup import load_names_for_actor, require_batch, require_course, require_job
-from service.store import audit, outbox
+from service.store import audit, webhook_events
 from service.store.batches import publishing, regrade_changes, regrades
 from service.store.batches.changes import Change as Change
 from service.store.batches.changes import ChangesSummary as ChangesSummary
@@ -208,5 +208,5 @@ def _record_publication(
     audit.record_action(session, actor.name, "publish", subject, subject_id, **counts)
     if publication_counts.published:
         subject_key = {"batch" if subject == "batch" else "grade": subject_id}
-        outbox.emit_grades_published(session, course_id, **subject_key, published=publication_counts.published)
+        webhook_events.emit_grades_published(session, course_id, **subject_key, published=publication_counts.published)
     return publication_counts

@@ -9,11 +9,11 @@ from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
 from service.operations.lookup import require_course
 from service.store import audit
-from service.store.outbox import WebhookEvent as WebhookEvent
 from service.store.people import webhooks
 from service.store.people.webhooks import MAX_URL_LENGTH as MAX_URL_LENGTH
 from service.store.people.webhooks import DeliveryLine, WebhookLine
 from service.store.states import Role
+from service.store.webhook_events import WebhookEvent as WebhookEvent
 
 
 def list_webhooks(service: Service, actor: Actor, course_id: int) -> list[WebhookLine]:

@@ -14,7 +14,7 @@ from datetime import datetime
 from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
-from service.store import outbox
+from service.store import webhook_events
 from service.store.batches.known_submissions import KnownSubmission, find_known_submission
 from service.store.codec import encode
 from service.store.courses import open_assignments
@@ -276,7 +276,7 @@ def _accept_batch(
     order = sorted(range(len(items)), key=keys.__getitem__)
     accepted_items = {number: _accept_item(session, items[number], terms) for number in order}
     accepted_batch = AcceptedBatch(batch.id, tuple(accepted_items[number] for number in range(len(items))))
-    outbox.emit_batch_finished(session, batch.id)
+    webhook_events.emit_batch_finished(session, batch.id)
     return accepted_batch
 
 

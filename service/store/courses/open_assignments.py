@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
-from service.store import outbox
+from service.store import webhook_events
 from service.store.courses import policies
 from service.store.courses.assignment_versions import FrozenAssignment, assignment_from_bytes, store_version
 from service.store.engine import now
@@ -89,7 +89,7 @@ def close_assignment(session: Session, course_id: int, assignment: str) -> None:
     row.closed_at = now(session)
     session.flush()
     if row.batch_id is not None:
-        outbox.emit_batch_finished(session, row.batch_id)
+        webhook_events.emit_batch_finished(session, row.batch_id)
 
 
 def remove_assignment(session: Session, course_id: int, assignment: str) -> None:

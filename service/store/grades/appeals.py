@@ -8,7 +8,7 @@ from datetime import datetime
 from sqlalchemy import Select, and_, func, or_, select
 from sqlalchemy.orm import Session
 
-from service.store import audit, outbox
+from service.store import audit, webhook_events
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
 from service.store.grades import current_grades
@@ -68,7 +68,7 @@ def open_appeal(session: Session, submission_id: int, text: str) -> int:
     row = Appeal(submission_id=submission_id, text=text, asked_at=now(session))
     session.add(row)
     session.flush()
-    outbox.emit_appeal_opened(session, submission_id, row.id)
+    webhook_events.emit_appeal_opened(session, submission_id, row.id)
     return row.id
 
 

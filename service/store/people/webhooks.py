@@ -1,6 +1,6 @@
 """Webhooks of a course and the state of their deliveries.
 
-``outbox.py`` defines the events; the web server sends them.
+``webhook_events.py`` defines the events; the web server sends them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from service.store.engine import now
-from service.store.outbox import WebhookEvent
 from service.store.tables.courses import Delivery, Webhook
+from service.store.webhook_events import WebhookEvent
 from sim.errors import UsageError
 
 MAX_URL_LENGTH = 1000

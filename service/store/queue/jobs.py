@@ -20,7 +20,7 @@ from sqlalchemy import ColumnElement, Select, Table, bindparam, select, update
 from sqlalchemy.orm import Session
 from sqlalchemy.sql.dml import ReturningUpdate
 
-from service.store import outbox, phases
+from service.store import phases, webhook_events
 from service.store.codec import encode
 from service.store.engine import Store, now, retry_conflicts
 from service.store.grades import overrides, plots, result_cache
@@ -101,7 +101,7 @@ def copy_grade(session: Session, job_id: str, source_id: str, current_time: date
         raise HostError(f"The job {job_id} cannot be given a grade: it does not wait")
     result_cache.copy_rows(session, source_id, job_id)
     _settle_grade(session, job_id, current_time)
-    outbox.emit_grade_copied(session, job_id)
+    webhook_events.emit_grade_copied(session, job_id)
 
 
 def supersede_jobs(session: Session, submissions: Select[int], new_job_id: str, current_time: datetime) -> None:
@@ -113,7 +113,7 @@ def supersede_jobs(session: Session, submissions: Select[int], new_job_id: str, 
         "superseded_by": new_job_id,
     }
     if apply_transition(session, SUPERSEDE, conditions, current_time, reason):
-        outbox.emit_superseded_batches(session, submissions, current_time)
+        webhook_events.emit_superseded_batches(session, submissions, current_time)
 
 
 def put_aside_job(session: Session, job_id: str, current_time: datetime) -> None:
@@ -241,7 +241,7 @@ def finish_job(
         _apply_owned_transition(session, FINISH, claim, current_time, values)
         results.insert_grade(session, claim.job_id, prepared_grade, current_time)
         _settle_grade(session, claim.job_id, current_time)
-        outbox.emit_grade_finished(session, claim.job_id)
+        webhook_events.emit_grade_finished(session, claim.job_id)
 
 
 @retry_conflicts
@@ -269,7 +269,7 @@ def finish_job_from_cache(store: Store, claim: Claim) -> bool:
         )
         result_cache.copy_rows(session, source, claim.job_id)
         _settle_grade(session, claim.job_id, current_time)
-        outbox.emit_grade_finished(session, claim.job_id)
+        webhook_events.emit_grade_finished(session, claim.job_id)
         return True
 
 
@@ -302,7 +302,7 @@ def apply_host_fault(
         _apply_owned_transition(
             session, GIVE_UP, claim, current_time, {"error": f"Tried {times}, the last time: {reason}"}
         )
-        outbox.emit_job_ended(session, claim.job_id)
+        webhook_events.emit_job_ended(session, claim.job_id)
         return GIVE_UP.after
     _apply_owned_transition(
         session, TRY_AGAIN, claim, current_time, {"error": reason, "due_at": current_time + retry.wait(claim.attempt)}
@@ -315,7 +315,7 @@ def give_up_job(store: Store, claim: Claim, reason: str) -> None:
     """Mark a job as dead without further attempts. Raises LeaseLost if the worker no longer owns it."""
     with store.transaction() as session:
         _apply_owned_transition(session, GIVE_UP, claim, now(session), {"error": reason})
-        outbox.emit_job_ended(session, claim.job_id)
+        webhook_events.emit_job_ended(session, claim.job_id)
 
 
 @retry_conflicts
@@ -334,7 +334,7 @@ def cancel_jobs(session: Session, batch_id: str, reason: str, current_time: date
     """Cancel all unfinished jobs of a batch; a running job stops at its next heartbeat."""
     cancelled_count = apply_transition(session, CANCEL, (Job.batch_id == batch_id,), current_time, {"error": reason})
     if cancelled_count:
-        outbox.emit_batch_finished(session, batch_id)
+        webhook_events.emit_batch_finished(session, batch_id)
     return cancelled_count
 
 

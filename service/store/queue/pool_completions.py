@@ -10,7 +10,7 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service.store import audit, outbox
+from service.store import audit, webhook_events
 from service.store.grades import statements
 from service.store.states import CompletionRule, JobQueue, Standing
 from service.store.tables.courses import Course
@@ -65,7 +65,9 @@ def _publish(session: Session, provisional: Job, completion: Job, current_time: 
     statements.state_publication(session, [completion.id])
     worker = completion.worker or "workers"
     audit.record_action(session, worker, "publish exact", "job", completion.id, replaced=provisional.id)
-    outbox.emit_grades_published(session, _load_course(session, completion).id, grade=completion.id, published=1)
+    webhook_events.emit_grades_published(
+        session, _load_course(session, completion).id, grade=completion.id, published=1
+    )
 
 
 def is_always_replaced(session: Session, provisional: Job) -> bool:

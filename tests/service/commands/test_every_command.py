@@ -31,13 +31,13 @@ from service.store.courses.assignment_versions import freeze_assignment
 from service.store.engine import now, open_store
 from service.store.grades import appeals, comments, overrides, results
 from service.store.installation import load_secret
-from service.store.outbox import WebhookEvent
 from service.store.people import webhooks
 from service.store.people.membership import make_instructor
 from service.store.queue import jobs
 from service.store.statement_log import list_keys
 from service.store.states import JobState
 from service.store.tables.submissions import Job
+from service.store.webhook_events import WebhookEvent
 from submissions.assignment.examples import locate_examples
 from submissions.student_identity import RejectedSubmission, Student
 

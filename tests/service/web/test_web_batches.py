@@ -13,8 +13,8 @@ from starlette.testclient import TestClient
 import acting
 import report_builders
 from builders import PROGRAM, echo
-from service.store import outbox as told_outbox
 from service.store import purge
+from service.store import webhook_events as told_outbox
 from service.store.batches import batches, job_lines, publishing
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment

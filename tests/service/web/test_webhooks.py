@@ -15,7 +15,7 @@ import pytest
 
 from service import webhook_sender
 from service.outgoing_requests import ALL_NETWORKS, NO_NETWORKS, HttpResponse, Networks
-from service.store import outbox
+from service.store import webhook_events
 from service.store.engine import Store, now
 from service.store.people import webhooks
 from service.store.tables.courses import Course
@@ -61,7 +61,7 @@ def hooked(store: Store, url: str) -> str:
         session.add(Course(id=1, name="default", created_at=now(session)))
         session.flush()
         secret = webhooks.create_webhook(session, 1, url, ["grades.published"])[1]
-        outbox.emit_grades_published(session, 1, batch="b", published=3)
+        webhook_events.emit_grades_published(session, 1, batch="b", published=3)
     return secret
 
 
@@ -110,7 +110,7 @@ def test_a_slow_receiver_delays_no_other(store: Store, monkeypatch: pytest.Monke
     with store.transaction() as session:
         webhooks.create_webhook(session, 1, "https://fast.example.org/", ["grades.published"])
         for published in range(10):
-            outbox.emit_grades_published(session, 1, batch="b", published=published)
+            webhook_events.emit_grades_published(session, 1, batch="b", published=published)
     arrived: list[str] = []
     all_arrived, waited = Event(), Event()
 

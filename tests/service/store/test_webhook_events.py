@@ -16,7 +16,7 @@ from builders import accept_one, grading_request, prepared
 from naming import is_named
 from service.operations import replies
 from service.operations.context import Actor
-from service.store import ids, outbox
+from service.store import ids, webhook_events
 from service.store.batches import intake
 from service.store.engine import Store
 from service.store.people import credentials, membership, webhooks
@@ -109,12 +109,12 @@ def test_only_one_sender_has_a_delivery(store: Store) -> None:
     hook(store, "grade.finished")
     submit(store, "ada")
     grade_next(store)
-    (claimed,) = outbox.claim_deliveries(store, 8)
+    (claimed,) = webhook_events.claim_deliveries(store, 8)
     assert claimed.attempt == 1
-    assert outbox.claim_deliveries(store, 8) == []
-    outbox.record_delivery(store, claimed)
+    assert webhook_events.claim_deliveries(store, 8) == []
+    webhook_events.record_delivery(store, claimed)
     _past(store, timedelta(hours=1))
-    assert outbox.claim_deliveries(store, 8) == []
+    assert webhook_events.claim_deliveries(store, 8) == []
 
 
 def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day(store: Store) -> None:
@@ -123,11 +123,11 @@ def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day
     grade_next(store)
     waits = []
     for _ in range(40):
-        due = outbox.claim_deliveries(store, 8)
+        due = webhook_events.claim_deliveries(store, 8)
         if not due:
             break
         before = datetime.now(UTC)
-        outbox.record_failure(store, due[0], "answered 500")
+        webhook_events.record_failure(store, due[0], "answered 500")
         with store.reading() as session:
             row = session.scalars(select(Delivery)).one()
         if row.due_at is None:
@@ -144,27 +144,29 @@ def test_what_does_not_arrive_is_tried_again_ever_later_and_given_up_after_a_day
 def test_slow_receivers_of_a_course_delay_no_other_course(store: Store) -> None:
     for course_id, hooks, deliveries in ((1, 10, 5), (2, 1, 2)):
         _add_due_deliveries(store, course_id, hooks, deliveries)
-    slow = outbox.claim_deliveries(store, 8)
+    slow = webhook_events.claim_deliveries(store, 8)
     fast = [each for each in slow if each.payload["course"] == 2]
     assert [each.payload["course"] for each in slow].count(1) == 7
     # One delivery of each webhook is sent at a time. A course with fewer of them is first.
     for each in fast:
-        outbox.record_delivery(store, each)
-    (after,) = outbox.claim_deliveries(store, 1)
+        webhook_events.record_delivery(store, each)
+    (after,) = webhook_events.claim_deliveries(store, 1)
     assert [each.payload["course"] for each in (*fast, after)] == [2, 2]
-    rest = outbox.claim_deliveries(store, 8)
+    rest = webhook_events.claim_deliveries(store, 8)
     assert [each.payload["course"] for each in rest] == [1, 1, 1]
     assert len({each.url for each in (*slow, *rest)}) == 11
-    assert outbox.claim_deliveries(store, 8) == []
-    outbox.record_failure(store, slow[0] if slow[0] not in fast else slow[1], "answered 500")
-    assert len(outbox.claim_deliveries(store, 8)) == 1
+    assert webhook_events.claim_deliveries(store, 8) == []
+    webhook_events.record_failure(store, slow[0] if slow[0] not in fast else slow[1], "answered 500")
+    assert len(webhook_events.claim_deliveries(store, 8)) == 1
 
 
 def test_of_two_senders_one_claims_a_webhooks_delivery(store: Store) -> None:
     _add_due_deliveries(store, 1, 3, 5)
     with ThreadPoolExecutor(4) as pool:
         claimed = [
-            each for claims in pool.map(lambda _: outbox.claim_deliveries(store, 8), range(4)) for each in claims
+            each
+            for claims in pool.map(lambda _: webhook_events.claim_deliveries(store, 8), range(4))
+            for each in claims
         ]
     assert len(claimed) == len({each.url for each in claimed}) == 3
 
@@ -213,7 +215,7 @@ def test_what_waits_for_a_revoked_webhook_is_not_sent(store: Store) -> None:
     with store.transaction() as session:
         assert not webhooks.revoke_webhook(session, 2, revoked)
         assert webhooks.revoke_webhook(session, 1, revoked)
-    assert outbox.claim_deliveries(store, 8) == []
+    assert webhook_events.claim_deliveries(store, 8) == []
 
 
 def test_addresses_that_are_none_are_refused(store: Store) -> None:
@@ -251,4 +253,4 @@ def _add_due_deliveries(store: Store, course_id: int, hooks: int, deliveries: in
         for number in range(hooks):
             webhooks.create_webhook(session, course_id, f"https://hooks.example.org/{course_id}/{number}", EVENTS)
         for number in range(deliveries):
-            outbox.emit_grades_published(session, course_id, batch="b", published=number)
+            webhook_events.emit_grades_published(session, course_id, batch="b", published=number)
