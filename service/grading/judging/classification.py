@@ -10,8 +10,8 @@ from fractions import Fraction
 from service.grading.grade import CriterionResult
 from service.grading.judging.accuracy_curves import compute_curves
 from service.grading.judging.judge_declaration import Case, IndexedTrials, declare_case_judge, has_hidden
+from service.grading.judging.marks import compute_accuracy_share, compute_steps_share, round_to_steps
 from service.grading.judging.message_parts import join_with_commas
-from service.grading.judging.outcome import compute_accuracy_share, compute_steps_share, round_to_steps
 from service.grading.judging.recognition import ClassificationResult, build_recognition_result, classify, judge_pooled
 from sim.sentences import Sentence
 from submissions.criteria.classification import Classification

@@ -23,8 +23,9 @@ from service.grading.findings import (
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.answers import MISSING, as_text, find_at_path, parse_json_answer
 from service.grading.judging.judge_declaration import Case, declare_case_judge, judge_by_trial, judge_once
+from service.grading.judging.marks import round_to_steps
 from service.grading.judging.message_parts import describe_fault, join_with_or, join_with_semicolons, quote_text
-from service.grading.judging.outcome import Outcome, fail_with, pass_with, round_to_steps
+from service.grading.judging.outcome import Outcome, fail_with, pass_with
 from service.grading.judging.source_answers import SPEECH, SourceAnswers
 from sim.errors import AssignmentError
 from sim.sentences import Sentence, join_sentences

@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 
 from responders.function_calls import CallResult, CallResults
 from service.grading.grade import CriterionResult, Evidence, PoolValue, TrialResult, VisibleFeedback
+from service.grading.judging.marks import combine_outcomes, compute_marks, round_to_steps
 from service.grading.judging.message_parts import add_hidden_note, add_place, describe_early_end, describe_place
-from service.grading.judging.outcome import Outcome, combine_outcomes, compute_marks, round_to_steps
+from service.grading.judging.outcome import Outcome
 from service.grading.judging.source_answers import SourceAnswers
 from service.grading.pools.pool_sentences import describe_for_staff, describe_for_students
 from service.grading.pools.pool_values import ERROR_OF_GRADE, compute_pool_share

@@ -29,6 +29,7 @@ from service.grading.judging.answers import as_text, find_at_path, parse_json_an
 from service.grading.judging.geometry import Side
 from service.grading.judging.image_replies import Reply, ReplyStatus, collect_replies
 from service.grading.judging.judge_declaration import IndexedTrials
+from service.grading.judging.marks import compute_marks
 from service.grading.judging.message_parts import (
     add_hidden_note,
     add_place,
@@ -36,7 +37,6 @@ from service.grading.judging.message_parts import (
     describe_place,
     quote_text,
 )
-from service.grading.judging.outcome import compute_marks
 from service.grading.judging.patterns import Sample, group_by_pattern
 from service.grading.judging.text_tokens import LabelFinder
 from service.grading.judging.true_labels import NO_IMAGE, collect_labels, find_counted_images, find_missing_label

@@ -18,8 +18,8 @@ from service.grading.judging.accuracy_curves import (
     find_range_above,
 )
 from service.grading.judging.judge_declaration import Case, IndexedTrials, declare_case_judge, has_hidden
+from service.grading.judging.marks import round_to_steps
 from service.grading.judging.message_parts import join_with_commas
-from service.grading.judging.outcome import round_to_steps
 from service.grading.judging.recognition import build_recognition_result, classify, judge_pooled
 from service.language import translatable
 from sim.sentences import Sentence, join_sentences

@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 
 from service.grading.grade import PoolValue
-from service.grading.judging.outcome import Over
+from service.grading.judging.marks import Over
 from sim.sentences import Sentence, join_sentences
 
 _STUDENTS_STEP = 5  # per cent

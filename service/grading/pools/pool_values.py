@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from service.grading.grade import PoolValue
-from service.grading.judging.outcome import Outcome, Over, combine_outcomes
+from service.grading.judging.marks import Over, combine_outcomes
+from service.grading.judging.outcome import Outcome
 from service.grading.pools.mean_bounds import bound_mean
 from service.grading.pools.pass_bounds import bound_passes
 from submissions.criteria import Criterion

@@ -16,7 +16,7 @@ from judging import START, criterion, recorded, talk
 from report_builders import row_of
 from service.grading.grade import Grade, TrialResult
 from service.grading.judging.judge import judge
-from service.grading.judging.outcome import round_to_steps
+from service.grading.judging.marks import round_to_steps
 from service.reports.formats.gradescope import render_gradescope
 from service.reports.formats.json_output import render_json
 from service.reports.formats.moodle import render_moodle_csv

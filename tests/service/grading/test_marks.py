@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from judging import criterion, judged, recorded, talk
 from service.grading.judging.answers import is_same_value
-from service.grading.judging.outcome import Outcome, Over, combine_outcomes, compute_accuracy_share, compute_marks
+from service.grading.judging.marks import Over, combine_outcomes, compute_accuracy_share, compute_marks
+from service.grading.judging.outcome import Outcome
 
 outcomes = st.lists(
     st.one_of(
