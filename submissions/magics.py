@@ -110,11 +110,12 @@ def parse_magic(line: str, number: int = 1) -> Flags:
     """
     name, *arguments = line.lstrip("%").split(maxsplit=1) or [""]
     if name.startswith("%") and (intended_name := name.lstrip("%")[:40]):
-        raise UsageError(f"line {number}: there is a blank between the percent signs; expected %%{intended_name}")
+        problem = f"there is a blank between the percent signs; expected %%{intended_name}"
+        raise UsageError("line %(line)s: %(problem)s", line=number, problem=problem)
     try:
         return parse_flags(name, "".join(arguments))
     except UsageError as error:
-        raise UsageError(f"line {number}: {error}") from None
+        raise UsageError("line %(line)s: %(problem)s", line=number, problem=error.message) from None
 
 
 def parse_flags(name: str, arguments: str) -> Flags:

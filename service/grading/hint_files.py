@@ -14,7 +14,7 @@ from service.grading.hint_code import Statement
 from service.grading.hint_structure import DRIVING_CRITERIA, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES
 from service.language import translatable
-from sim.sentences import Sentence
+from sim.sentences import Sentence, iterate_values
 from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
 from submissions.criteria.code import SourceRules
 from submissions.criteria.drawing import Drawing
@@ -27,7 +27,7 @@ _ROBOT = re.compile(
 #: A word that is not a flag, and on the next line the flag with the word before it.
 #: Flags of one letter with a - before each, and no blanks.
 _JOINED_FLAGS = re.compile(r"(?<=\s)(?:-[A-Za-z]){2,}(?=\s|$)")
-_CUT_VALUE = re.compile(r"'(\w+)' is not a flag\n.*?(-[br]|--background|--robotSetup) (\w+) \1\b")
+_CUT_VALUE = re.compile(r"(-[br]|--background|--robotSetup) (\w+) (\w+)")
 
 
 def hint_about_starter_files(clues: Clues) -> Iterator[str]:
@@ -105,13 +105,13 @@ def hint_about_ignored_magic(clues: Clues) -> Iterator[str]:
     for listing in clues.programs:
         magic_index = listing.magic_place
         if magic_index is not None and (clues.marked_cell is None or listing.name == name_cell(clues.marked_cell)):
-            reason = clues.ignored_magic.partition(": ")[2] or clues.ignored_magic
-            cut_match = _CUT_VALUE.search(f"{reason}\n{listing.lines[magic_index]}")
+            reason = dict(iterate_values(clues.ignored_magic)).get("problem", clues.ignored_magic)
+            cut_match = _CUT_VALUE.search(listing.lines[magic_index])
             if cut_match is not None:
                 fix = Sentence(
                     "The value of %(flag)s has no blank: write %(flag)s %(value)s",
-                    flag=cut_match[2],
-                    value=f"{cut_match[3]}_{cut_match[1]}",
+                    flag=cut_match[1],
+                    value=f"{cut_match[2]}_{cut_match[3]}",
                 )
             elif (joined_match := _JOINED_FLAGS.search(listing.lines[magic_index])) is not None:
                 fix = Sentence(

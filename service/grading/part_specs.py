@@ -54,7 +54,7 @@ def read_head(text: str, assignment: Assignment) -> ProgramHead:
         settings = apply_flags(flags)
     except UsageError as error:
         note = Sentence("the program's magic line is ignored: %(error)s", error=error.message)
-        return ProgramHead(Flags(), comment_out_magic(text), (note,), str(error))
+        return ProgramHead(Flags(), comment_out_magic(text), (note,), error.message)
     world = assignment.world
     notes: list[str] = []
     if "b" in flags.values and settings.background != world.background:
