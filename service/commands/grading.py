@@ -14,18 +14,11 @@ from pathlib import Path
 
 from responders.sandbox.isolation import FULL_ISOLATION, NO_ISOLATION
 from responders.sandbox.manager import Sandboxes
-from service.commands.nearest_numbers import (
-    NEAREST_FORMATS,
-    print_json_with_nearest,
-    print_nearest,
-    search_lost_criteria,
-)
 from service.commands.options import apply_channel_flags
 from service.commands.output import print_note, print_renderables, warn_about_missing_sandbox
 from service.grading.grade import Grade
 from service.grading.grader import grade as grade_submission
 from service.grading.pools.drawing import PoolExtent
-from service.grading.reruns.grade_causes import add_causes
 from service.grading.trial_runner import TrialRunner
 from service.home_secret import load_home_secret
 from service.language import load_language
@@ -78,8 +71,12 @@ def grade_all(
         HostError: At least one submission could not be graded.
         UsageError: At least one submission was rejected, and all others were graded.
     """
-    if nearest and (len(submissions) > 1 or form not in NEAREST_FORMATS):
-        raise UsageError("--nearest needs one submission, and the format text or json")
+    if nearest:
+        if len(submissions) > 1 or form not in ("text", "json"):
+            raise UsageError("--nearest needs one submission, and the format text or json")
+        from service.commands.nearest_numbers import print_json_with_nearest, print_nearest, search_lost_criteria
+    if causes:
+        from service.grading.reruns.grade_causes import add_causes
     # Read the assignment first: a mistake in it is not an error of a submission.
     named_definition = None if assignment is None else find_assignment(assignment)
     output_format = FORMATS[form]

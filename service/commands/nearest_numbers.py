@@ -18,7 +18,6 @@ from submissions.assignment.definition import Assignment
 from submissions.seeds import SeedSource
 from submissions.submission import Submission
 
-NEAREST_FORMATS = ("text", "json")
 #: Criteria beyond these are not searched. Those that lost most come first.
 _MAX_CRITERIA = 3
 

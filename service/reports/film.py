@@ -47,6 +47,7 @@ _COLOURS = (INK, LEFT, RIGHT, PEN, FAULT, SECOND_ROBOT, FAINT, RULE, _OFF_THE_FL
 _IMAGE_COLOURS, _TOO_NEAR = 150, 8
 _OVERSAMPLING = 3  # drawings are enlarged by this factor first, for smooth edges
 _ULTRASONIC_LIMIT = 2550  # mm
+_MARGIN = 8  # pixels around the points of a layer
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,12 +287,12 @@ class _RobotFrame:
 class _Layer:
     """A part of an image around some points, drawn enlarged and scaled down onto the image on exit."""
 
-    def __init__(self, image: Image.Image, points: list[Point], margin: int = 8) -> None:
+    def __init__(self, image: Image.Image, points: list[Point]) -> None:
         self._image = image
         x_values, y_values = ([point[axis] for point in points] or [0.0] for axis in (0, 1))
-        self._left, self._top = max(0, math.floor(min(x_values)) - margin), max(0, math.floor(min(y_values)) - margin)
-        right = min(image.width, math.ceil(max(x_values)) + margin)
-        bottom = min(image.height, math.ceil(max(y_values)) + margin)
+        self._left, self._top = (max(0, math.floor(min(values)) - _MARGIN) for values in (x_values, y_values))
+        right = min(image.width, math.ceil(max(x_values)) + _MARGIN)
+        bottom = min(image.height, math.ceil(max(y_values)) + _MARGIN)
         self._size = max(0, right - self._left), max(0, bottom - self._top)
         self._layer = Image.new("RGBA", (self._size[0] * _OVERSAMPLING, self._size[1] * _OVERSAMPLING))
         self._draw = ImageDraw.Draw(self._layer)

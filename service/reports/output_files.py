@@ -142,7 +142,8 @@ def write_report(folder: Path, grade: Grade, submission: Submission, student_nam
     view = build_student_view(grade, language=language)
 
     def render() -> str:
-        plots = draw_all_plots(grade, cells=read_diagrams(submission.notebook).cells, omitted_kinds=VECTOR_KINDS)
+        cells = () if submission.notebook is None else read_diagrams(submission.notebook).cells
+        plots = draw_all_plots(grade, cells=cells, omitted_kinds=VECTOR_KINDS)
         return render_report_page(view, plots, submission)
 
     return write_page(folder, f"{build_file_stem(student_name)}.html", render_or_explain(view, render))

@@ -215,7 +215,7 @@ def build_page(view: View, submission: Submission | None = None, replayed_trials
         ),
         scenes=tuple(_build_scene(grade, scenario, plots, language) for scenario in list_scenarios(grade)),
         diagrams=()
-        if submission is None
+        if submission is None or submission.notebook is None
         else list_own_diagrams(grade, read_diagrams(submission.notebook).cells, language),
         trials=trial_lines,
         more_trials=len(grade.trials) - len(trial_lines),

@@ -125,11 +125,9 @@ def _load_newest_time(session: Session) -> datetime | None:
     return session.scalar(select(StatementEntry.made_at).order_by(StatementEntry.number.desc()).limit(1))
 
 
-def load_leaves(session: Session, start: int = 0, stop: int | None = None) -> list[bytes]:
-    """Return the leaf hashes of the entries from ``start`` to before ``stop``."""
-    query = select(StatementEntry.leaf_sha256).where(StatementEntry.number >= start).order_by(StatementEntry.number)
-    if stop is not None:
-        query = query.where(StatementEntry.number < stop)
+def load_leaves(session: Session) -> list[bytes]:
+    """Return the leaf hashes of all entries."""
+    query = select(StatementEntry.leaf_sha256).order_by(StatementEntry.number)
     return [bytes.fromhex(leaf) for leaf in session.scalars(query)]
 
 

@@ -68,10 +68,10 @@ def tokenize_text(text: str) -> list[Token]:
     return tokens
 
 
-def find_words(words: Sequence[str], phrase: Sequence[str], start: int = 0) -> int | None:
-    """Return the first place from ``start`` on that matches all of ``phrase``, or None."""
+def find_words(words: Sequence[str], phrase: Sequence[str]) -> int | None:
+    """Return the first place that matches all of ``phrase``, or None."""
     phrase = list(phrase)
-    for index in range(start, len(words) - len(phrase) + 1):
+    for index in range(len(words) - len(phrase) + 1):
         if list(words[index : index + len(phrase)]) == phrase:
             return index
     return None

@@ -105,13 +105,12 @@ def write_text(
     size: float = 8.5,
     colour: str = INK,
     bold: bool = False,
-    ha: str = "left",
     va: str = "baseline",
 ) -> Text:
     """Write text at ``x``, ``y`` inches from the lower left corner of the figure."""
     width, height = figure.get_size_inches()
     return figure.text(
-        x / width, y / height, replace_missing_glyphs(text), color=colour, ha=ha, va=va, font=load_font(size,
+        x / width, y / height, replace_missing_glyphs(text), color=colour, ha="left", va=va, font=load_font(size,
         bold=bold),
         parse_math=False,
     )  # fmt: skip

@@ -195,10 +195,10 @@ class Drawing:
         self.items.append(Area(place.corners, fill, edge, hatched=hatched))
 
 
-def create_drawing(height: float, title: str, subtitle: str = "", width: float = WIDTH) -> Drawing:
+def create_drawing(height: float, title: str, subtitle: str = "") -> Drawing:
     """Return a page with its title and subtitle at the top left, in ``HEAD`` inches."""
-    drawing = Drawing(width, height)
-    for line in lay_out_title(width, height, title, subtitle):
+    drawing = Drawing(WIDTH, height)
+    for line in lay_out_title(WIDTH, height, title, subtitle):
         drawing.add_text(
             TITLE_LEFT, line.top, line.text, size=line.size, colour=line.colour, bold=line.bold, vertical="top"
         )

@@ -76,7 +76,7 @@ def draw_all_plots(
         for plot in list_plots(view.grade):
             if plot.name not in png_files and plot.kind not in omitted_kinds:
                 png_files[plot.name] = _render_plot(view.grade, plot, images)
-        for own_diagram in list_own_diagrams(view.grade, cells):
+        for own_diagram in list_own_diagrams(view.grade, cells) if cells else ():
             for plot in own_diagram.plots:
                 if plot.name not in png_files:
                     png_files[plot.name] = _render_own_plot(own_diagram, view.grade, plot)
