@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import TypeVar
 
 from service.batch_rows import describe_missing_grade
 from service.grading.class_statistics import PASS_SHARE
 from service.language import ENGLISH, Language
+from service.moderation_records import SheetAppeal, SheetOverride
 from service.operations.context import Actor, Service
 from service.operations.errors import Invalid, NotFound
 from service.operations.exports import Download
 from service.operations.lookup import require_batch, require_course
-from service.reports.moderation import (
-    ModerationSheet,
-    SheetAppeal,
-    SheetLogHead,
-    SheetMarks,
-    SheetOverride,
-    SheetVersion,
-    render_moderation_sheet,
-)
+from service.reports.moderation import ModerationSheet, SheetMarks, render_moderation_sheet
 from service.store.batches import batch_table, job_lines, moderation_records, stored_requests
 from service.store.batches.class_overview import compute_overviews
 from service.store.batches.job_lines import JobLine
-from service.store.courses.hidden_names import HiddenNames, load_hidden_names
+from service.store.courses.hidden_names import load_hidden_names
 from service.store.engine import now
 from service.store.states import Role
 from submissions.raw_files import sanitise_name
+
+LabelledRecord = TypeVar("LabelledRecord", SheetAppeal, SheetOverride)
 
 
 def download_sheet(
@@ -58,7 +55,10 @@ def _load_sheet(service: Service, actor: Actor, course_id: int, batch_id: str, a
         overviews = compute_overviews(session, course_id, own_lines, PASS_SHARE, hidden_names)
         overview = overviews[0] if overviews else None
         conditions = moderation_records.match_sheet_jobs(session, batch_id, name)
-        head = moderation_records.load_newest_head(session)
+
+        def label_student(record: LabelledRecord) -> LabelledRecord:
+            return replace(record, student=hidden_names.label_student(name, record.student))
+
         return ModerationSheet(
             course=course.name,
             batch=batch.name,
@@ -71,35 +71,10 @@ def _load_sheet(service: Service, actor: Actor, course_id: int, batch_id: str, a
             quality=None if overview is None else overview.quality,
             distribution=() if overview is None else overview.distribution,
             marks=tuple(map(_build_marks, lines)),
-            overrides=tuple(
-                SheetOverride(
-                    _label(hidden_names, name, each.student),
-                    each.title,
-                    each.graded,
-                    each.marks,
-                    each.reason,
-                    each.actor,
-                    each.made_at,
-                    each.withdrawn_at,
-                )
-                for each in moderation_records.load_overrides(session, conditions)
-            ),
-            appeals=tuple(
-                SheetAppeal(
-                    _label(hidden_names, name, each.student),
-                    each.text,
-                    each.asked_at,
-                    each.answer,
-                    each.actor,
-                    each.answered_at,
-                )
-                for each in moderation_records.load_appeals(session, conditions)
-            ),
-            versions=tuple(
-                SheetVersion(each.assignment, each.grader, each.grader_sha256, each.sandbox, each.count)
-                for each in moderation_records.load_versions(session, conditions)
-            ),
-            log_head=None if head is None else SheetLogHead(head.size, head.root_sha256, head.made_at),
+            overrides=tuple(map(label_student, moderation_records.load_overrides(session, conditions))),
+            appeals=tuple(map(label_student, moderation_records.load_appeals(session, conditions))),
+            versions=tuple(moderation_records.load_versions(session, conditions)),
+            log_head=moderation_records.load_newest_head(session),
         )
 
 
@@ -117,10 +92,6 @@ def _choose_assignment(lines: Sequence[JobLine], assignment: str) -> str:
     if assignment not in assignments:
         raise NotFound("the batch has no submissions for %(assignment)s", assignment=assignment)
     return assignment
-
-
-def _label(hidden_names: HiddenNames, assignment: str, student: str) -> str:
-    return hidden_names.label_student(assignment, student)
 
 
 def _build_marks(line: JobLine) -> SheetMarks:

@@ -13,6 +13,7 @@ from decimal import Decimal
 from service.grading.class_statistics import AssignmentStatistics, Cause, MarksBin
 from service.grading.task_quality import Interval, TaskQuality
 from service.language import ENGLISH, Language, translatable
+from service.moderation_records import SheetAppeal, SheetLogHead, SheetOverride, SheetVersion
 from service.reports.display_text import format_decimal
 from service.reports.html import render_page
 from service.reports.verdict_sentences import describe_verdict
@@ -31,17 +32,6 @@ _VISIBILITIES = {
 
 
 @dataclass(frozen=True, slots=True)
-class SheetVersion:
-    """The versions that made the grades of ``count`` submissions."""
-
-    assignment: str
-    grader: str
-    grader_sha256: str
-    sandbox: str
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
 class SheetMarks:
     """The marks of one student; None if there is no grade, with the reason in ``note``."""
 
@@ -55,41 +45,6 @@ class SheetMarks:
     adjusted: int  # criteria that staff adjusted
     unjudged: int  # criteria that could not be judged
     note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class SheetOverride:
-    """A criterion that staff adjusted. ``graded`` is None if it could not be judged, ``marks`` if it is excused."""
-
-    student: str
-    title: str
-    graded: Decimal | None
-    marks: Decimal | None
-    reason: str
-    actor: str
-    made_at: datetime
-    withdrawn_at: datetime | None
-
-
-@dataclass(frozen=True, slots=True)
-class SheetAppeal:
-    """An appeal; ``answer`` is None while it is open."""
-
-    student: str
-    text: str
-    asked_at: datetime
-    answer: str | None
-    actor: str | None
-    answered_at: datetime | None
-
-
-@dataclass(frozen=True, slots=True)
-class SheetLogHead:
-    """The newest head of the log of statements that was written to be filed."""
-
-    size: int
-    root_sha256: str
-    made_at: datetime
 
 
 @dataclass(frozen=True, slots=True)
