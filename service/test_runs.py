@@ -12,7 +12,7 @@ from service.grading.grade import Grade
 from service.grading.grader import ProgressObserver, grade
 from service.grading.trial_runner import TrialRunner
 from service.plotting import load_own_floors
-from service.reports.display_text import to_display_text
+from service.reports.display_text import to_display_text, to_one_line
 from service.reports.faults import group_faults
 from service.reports.replay.document import build_grade_replay, compress_replay
 from service.reports.replay.trial import format_moment_link
@@ -115,7 +115,13 @@ def _build_result(run: Grade, submission: Submission) -> dict[str, Any]:
         "lines": [[round(t, 2), to_display_text(text, _MAX_LINE_LENGTH)] for t, text in lines[:_MAX_LINES]],
         "more_lines": max(0, len(lines) - _MAX_LINES),
         "faults": [
-            {"where": fault.where, "message": fault.message, "hint": fault.hint}
+            {
+                "where": fault.where,
+                "file": to_one_line(fault.file, 60),
+                "line": fault.line,
+                "message": fault.message,
+                "hint": fault.hint,
+            }
             for fault in group_faults(run, submission)
         ],
         "failed": format_moment_link(1, faults[0].t) if faults else "",

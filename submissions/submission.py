@@ -106,6 +106,12 @@ class Submission:
             return replace(self, responder=SourceFile(self.responder.name, text))
         return replace(self, files={**self.files, file: text.encode("utf-8", "surrogatepass")})
 
+    def read_texts(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Return the texts of the files with these names, as an assignment asks for them; empty for missing files."""
+        parts = {PART_FILES["program"]: self.program, PART_FILES["responder"]: self.responder}
+        sources = (parts.get(name) or self.python_files.get(name) for name in names)
+        return tuple("" if source is None else source.text for source in sources)
+
     def files_without(self, agents: Iterable[str]) -> Mapping[str, bytes]:
         """Return the files without those of these agents, which other processes must not read."""
         agents = tuple(agents)

@@ -15,7 +15,7 @@ from service.grading.hint_structure import DRIVING_CRITERIA, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES
 from service.language import translatable
 from sim.sentences import Sentence, iterate_values
-from submissions.assignment.folder import list_catalogue_ids, locate_assignment_folder
+from submissions.assignment.starter import read_starter
 from submissions.criteria.code import SourceRules
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.point import Circuits
@@ -74,11 +74,8 @@ def _drop_blank_lines(lines: Sequence[str]) -> list[str]:
 
 @cache
 def _load_starter_files(assignment: str) -> Mapping[str, tuple[str, ...]]:
-    """Return the lines of each starter file. Only assignments in the catalogue are known."""
-    if assignment not in list_catalogue_ids():
-        return {}
-    files = sorted((locate_assignment_folder(assignment) / "starter").glob("*.py"))
-    return {file.name: tuple(file.read_text("utf-8").split("\n")) for file in files}
+    """Return the lines of each starter file."""
+    return {name: tuple(text.split("\n")) for name, text in read_starter(assignment).items()}
 
 
 def hint_about_swapped_parts(clues: Clues) -> Iterator[str]:

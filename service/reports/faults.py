@@ -31,6 +31,9 @@ _PARTY_TITLES: Mapping[str, str] = MappingProxyType(
         "assignment": translatable("Assignment"),
     }
 )
+_PARTY_FILES: Mapping[str, str] = MappingProxyType(
+    {"program": PART_FILES["program"], "second program": SECOND_PROGRAM, "responder": PART_FILES["responder"]}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,10 @@ class SourceLine:
 
 @dataclass(frozen=True, slots=True)
 class FaultGroup:
-    """One fault and its frequency. All texts are safe to show."""
+    """One fault and its frequency. All texts are safe to show.
+
+    ``file`` and ``line`` are its place in the submitted files; empty and None if there is none.
+    """
 
     verdict: Verdict
     where: str
@@ -52,6 +58,8 @@ class FaultGroup:
     hint: str
     how_often: str
     excerpt: tuple[SourceLine, ...] = ()
+    file: str = ""
+    line: int | None = None
 
 
 def describe_other_faults(stated_fault: Fault | None, grade: Grade) -> Iterator[tuple[str, FaultGroup]]:
@@ -117,7 +125,16 @@ def _build_group(
         to_display_text(fault.hint, 600),
         how_often,
         excerpt,
+        *_locate_in_files(fault),
     )
+
+
+def _locate_in_files(fault: Fault) -> tuple[str, int | None]:
+    """Return the name under which the fault's file is submitted, and its line; no place in a notebook's cells."""
+    if fault.cell is not None or fault.line is None:
+        return "", None
+    agent_file = f"{fault.agent}.py" if fault.agent else ""
+    return fault.file or agent_file or _PARTY_FILES.get(fault.who, ""), fault.line
 
 
 def _find_source(fault: Fault, submission: Submission | None) -> SourceFile | None:

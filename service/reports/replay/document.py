@@ -5,36 +5,29 @@ It contains exactly what the reader's view contains. ``html.py`` makes the page 
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 
 from service.grading.grade import TrialResult
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_one_line
+from service.reports.floor_image import encode_built_in_floor, encode_floor
 from service.reports.replay.overlay import overlay_to_json
 from service.reports.replay.sources import Sources, collect_sources
 from service.reports.replay.trial import trial_to_json
 from service.reports.view import NO_OVERLAY, OverlayTrials, View, find_worst_trial, list_scenarios
-from sim.floors import build_floor, list_floor_names
+from sim.floors import list_floor_names
+from sim.floors.canvas import Pixels as Pixels
 from sim.recording import Recording
 from submissions.submission import Submission
 
-Pixels = NDArray[np.uint8]
 FORMAT, VERSION = "robomark replay", 1
 #: The compressed size limit of a report's trials together. The first trial is always included.
 REPORT_BYTES = 300_000
-_FLOOR_BYTES = 120_000
 _NO_FLOORS: Mapping[str, Pixels] = MappingProxyType({})
 
 
@@ -136,29 +129,9 @@ def _floor_to_json(recording: Recording, own_floors: Mapping[str, Pixels]) -> di
     """Return the floor of the trial, without an image if it is not available any more."""
     own_floor = own_floors.get(recording.background)
     if own_floor is not None:
-        image = _encode_image(own_floor)
+        image = encode_floor(own_floor)
     elif recording.background in list_floor_names():
-        image = _encode_built_in(recording.background, recording.label_patches, recording.sheet)
+        image = encode_built_in_floor(recording.background, recording.label_patches, recording.sheet)
     else:
         image = None
     return {"name": to_one_line(recording.background, 80), "image": image}
-
-
-@lru_cache(maxsize=12)
-def _encode_built_in(name: str, labels: bool, sheet: int) -> str:
-    return _encode_image(build_floor(name, labels=labels, seed=sheet).pixels)
-
-
-def _encode_image(pixels: Pixels) -> str:
-    """Return the image as a data URI: lossless if that is small, as for printed floors, otherwise lossy."""
-    image = Image.fromarray(np.ascontiguousarray(pixels[:, :, :3]))
-    data = _encode_webp(image, lossless=True, method=2)
-    if len(data) > _FLOOR_BYTES:
-        data = _encode_webp(image.resize((image.width // 2, image.height // 2)), quality=70)
-    return f"data:image/webp;base64,{base64.b64encode(data).decode('ascii')}"
-
-
-def _encode_webp(image: Image.Image, **options: Any) -> bytes:
-    buffer = io.BytesIO()
-    image.save(buffer, "WEBP", **options)
-    return buffer.getvalue()
