@@ -1,4 +1,4 @@
-// Shows a replay in a notebook. The component's files and WORDS come before this file.
+// Shows a replay in a notebook. The component's texts and files come before this file.
 
 async function render({ model, el }) {
   const report = element("div");

@@ -21,7 +21,7 @@ def _load_script() -> str:
     words = json.loads(package.joinpath("replay_words.json").read_text(encoding="utf-8"))
     parts = [*(package.joinpath("component", name) for name in names), package.joinpath("widget.js")]
     code = "\n".join(part.read_text(encoding="utf-8") for part in parts)
-    return f"const WORDS = {json.dumps(words)};\n{code}"
+    return f"const known = {json.dumps(words)};\nconst words = () => known;\n{code}"
 
 
 def _load_style() -> str:

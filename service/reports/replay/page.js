@@ -1,21 +1,31 @@
-// Starts the replay of a report's page. The page has its data and texts; links to moments change the page's address.
+// Starts the replays of a page, also those in parts that are loaded later. The page has their data and texts; links to
+// moments change the page's address.
 
-const WORDS = wordsOf(document.querySelector("section.replay > script"));
+let knownWords = null;
 
-function wordsOf(island) {
-  return island ? JSON.parse(island.textContent).words : null;
+// Returns the texts. All replays of a page have the same, and a page can get its first replay later.
+function words() {
+  knownWords ??= JSON.parse(document.querySelector("section.replay > script").textContent).words;
+  return knownWords;
 }
 
+// Follows links of the page until the replay is removed from it, for example for that of the next run.
 function followAddress(controls) {
-  window.addEventListener("hashchange", () => controls.follow(location.hash));
+  const removal = new AbortController();
+  const follow = (hash) => {
+    if (controls.root.isConnected) controls.follow(hash);
+    else removal.abort();
+  };
+  window.addEventListener("hashchange", () => follow(location.hash), { signal: removal.signal });
   document.addEventListener("click", (event) => {
     const link = event.target instanceof Element && event.target.closest("a[href^='#']");
-    if (link && link.hash === location.hash) controls.follow(link.hash);
-  });
+    if (link && link.hash === location.hash) follow(link.hash);
+  }, { signal: removal.signal });
   controls.follow(location.hash);
 }
 
 async function startReplay(section) {
+  section.dataset.started = "";
   const root = section.querySelector(".component");
   try {
     const { deflated } = JSON.parse(section.querySelector("script").textContent);
@@ -28,4 +38,12 @@ async function startReplay(section) {
   }
 }
 
-document.querySelectorAll("section.replay").forEach(startReplay);
+// Starts the replays that have not started yet. In a part that htmx loads, they are in templates, because htmx removes
+// scripts, also those with data.
+function startReplays() {
+  document.querySelectorAll("template.replay").forEach((template) => template.replaceWith(template.content));
+  document.querySelectorAll("section.replay:not([data-started])").forEach(startReplay);
+}
+
+startReplays();
+document.addEventListener("htmx:load", startReplays);

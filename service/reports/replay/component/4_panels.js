@@ -118,7 +118,7 @@ function readingWords(robot, name, ticks) {
   if (!values.length) return "–";
   if (values.length === 3) return values.map((value, part) => `${"RGB"[part]} ${Math.round(value)}`).join("  ");
   const unit = robot.units[name];
-  return `${values.map((value) => value.toFixed(unit === "mm" ? 0 : 1)).join(", ")}${WORDS.units[unit] ?? ` ${unit}`}`;
+  return `${values.map((value) => value.toFixed(unit === "mm" ? 0 : 1)).join(", ")}${words().units[unit] ?? ` ${unit}`}`;
 }
 
 function sentWords(image) {

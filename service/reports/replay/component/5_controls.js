@@ -147,7 +147,7 @@ class ReplayControls {
     this.play.textContent = say("pause");
     let last = performance.now();
     const frame = (now) => {
-      if (!this.playing) return;
+      if (!this.playing || !this.root.isConnected) return;
       if (!REDUCED.matches || now - last >= REDUCED_STEP) {
         this.seek(this.t + (Math.max(0, now - last) / 1000) * this.speed);
         last = now;
