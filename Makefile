@@ -6,7 +6,7 @@ PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, en
 # What is imported is compiled once and kept, also for who has that switched off: tests start thousands of processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick docs pictures lock wheel image release release-check clean
+.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick docs pictures editor lock wheel image release release-check clean
 
 setup: $(VENV)/.ready
 
@@ -76,6 +76,10 @@ else
 	uv pip install --quiet --python .venv-docs/bin/python --require-hashes -r docs/requirements.lock
 endif
 	touch $@
+
+# The editor of the pages, service/web/static/editor.min.js, from service/web/editor. Needs Node.js and npm.
+editor:
+	cd service/web/editor && npm ci --silent && npm run --silent build
 
 # The documents' pictures; needs Chromium, and minutes for the digits. `make pictures PICTURES=report` draws one.
 pictures: setup

@@ -53,6 +53,7 @@ def load_static_files() -> Mapping[str, tuple[str, bytes]]:
     """Return media type and content of the static files, by served name. The names contain a hash of the content."""
     web = files("service.web").joinpath("static")
     contents = {
+        "editor.js": web.joinpath("editor.min.js").read_text(encoding="utf-8"),
         "htmx.js": web.joinpath("htmx.min.js").read_text(encoding="utf-8"),
         "replay.js": load_report_script(),
         "robomark.css": load_report_style() + web.joinpath("robomark.css").read_text(encoding="utf-8"),
@@ -93,6 +94,7 @@ def _build_environment(language: Language) -> Environment:
     environment.filters["duration"] = _format_duration
     environment.filters["sentence"] = language.translate_sentence
     environment.filters["typed"] = _format_typed_text
+    environment.filters["whole"] = escape
     environment.globals["zone_now"] = format_current_offset
     return environment
 
