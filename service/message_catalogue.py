@@ -29,6 +29,7 @@ _ERROR_SOURCES = [
     (f"{name}.py", "python")
     for name in (
         "doctor",
+        "playground",
         "operations/**",
         "store/batches/intake",
         "store/courses/open_assignments",

@@ -23,6 +23,7 @@ from service.store.courses import policies
 from service.store.engine import Store
 from service.store.grades import current_grades, results
 from service.store.people import membership
+from service.store.queue.run_programs import split_program
 from service.store.tables.courses import AssignmentVersion, Course, Extension
 from service.store.tables.grades import Appeal
 from service.store.tables.people import Credential, Enrolment, Person
@@ -139,7 +140,7 @@ def _load_test_runs(
     names = ("state", "queued_at", "finished_at", "words", "error")
     ordered = query.order_by(Tryout.queued_at, Tryout.id)
     for row, assignment, packed, replay in session.execute(ordered, execution_options={"yield_per": _CHUNK_SIZE}):
-        files = {"submission.zip": packed} if packed else {}
+        files = {"submission.zip": split_program(packed)[0]} if packed else {}
         if replay:
             files["replay.json"] = zlib.decompress(replay)
         yield {"assignment": assignment, **_read_columns(row, names)}, files

@@ -86,6 +86,11 @@ def show_own(service: Service, actor: Actor, course_id: int, role: Role) -> OwnC
         return OwnCourse(course_id, require_course(session, actor, course_id, role).name, role)
 
 
+def show_membership(service: Service, actor: Actor, course_id: int) -> OwnCourse:
+    """Return a course in which the actor has any role. Raises NotFound."""
+    return show_own(service, actor, course_id, actor.roles.get(course_id, Role.STUDENT))
+
+
 def show_taught(service: Service, actor: Actor, course_id: int) -> TaughtCourse:
     """Return a course that the actor instructs. Raises NotFound."""
     with service.store.reading() as session:

@@ -22,7 +22,6 @@ from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.grades import appeals, results
 from service.store.grades.appeals import AppealLine
-from service.store.queue import test_runs
 from service.store.queue.queue_places import QueuePlace, estimate_place, estimate_places
 from service.store.states import Role
 from service.test_runs import build_single_trial_assignment
@@ -40,7 +39,6 @@ class TaskView:
     allowance: Allowance
     is_open: bool
     can_test_run: bool
-    has_test_run: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +110,7 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
-        is_open = _is_assignment_open(session, course_id, assignment)
+        is_open = is_assignment_open(session, course_id, assignment)
         attempts = own_submissions.load_own_attempts(session, enrolment_id, assignment)
         return TaskView(
             build_task_sheet(visible_assignment),
@@ -121,7 +119,6 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
             own_submissions.compute_allowance(session, enrolment_id, assignment),
             is_open,
             can_test_run=is_open and build_single_trial_assignment(visible_assignment) is not None,
-            has_test_run=test_runs.find_newest_run(session, enrolment_id, assignment) is not None,
         )
 
 
@@ -160,7 +157,7 @@ def show_submission_report(
         submission, attempts = submission_with_attempts
         assignment, place = submission.assignment, _add_queue_place(session, submission).place
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
-        is_open = _is_assignment_open(session, course_id, assignment)
+        is_open = is_assignment_open(session, course_id, assignment)
         submission_appeals = appeals.load_appeals(session, submission_id)
         visible_view = _load_student_view(session, submission, language) if submission.shown else None
     report = (
@@ -202,9 +199,15 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
         return SubmittedFiles(row.packed, f"{row.assignment}-{row.attempt}.zip")
 
 
+def is_assignment_open(session: Session, course_id: int, assignment: str) -> bool:
+    """Return whether students can submit to an assignment of a course."""
+    course_assignments = open_assignments.list_assignments(session, course_id)
+    return any(each.assignment == assignment and each.open for each in course_assignments)
+
+
 def load_visible_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
     """Return an assignment that is open or that the student has submitted to. Raises NotFound."""
-    if _is_assignment_open(session, course_id, assignment):
+    if is_assignment_open(session, course_id, assignment):
         return open_assignments.load_assignment(session, course_id, assignment)
     newest_attempt = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
     if not newest_attempt:
@@ -214,11 +217,6 @@ def load_visible_assignment(session: Session, course_id: int, enrolment_id: int,
 
 def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int:
     return require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-
-
-def _is_assignment_open(session: Session, course_id: int, assignment: str) -> bool:
-    course_assignments = open_assignments.list_assignments(session, course_id)
-    return any(each.assignment == assignment and each.open for each in course_assignments)
 
 
 def _require_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission:

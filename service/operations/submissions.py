@@ -18,13 +18,13 @@ from service.store.courses.open_assignments import CourseAssignment
 from service.store.states import JobQueue, Role
 from service.store.tables.courses import Course
 from sim.errors import UsageError
-from submissions.assignment.definition import Assignment
+from submissions.assignment.definition import Assignment, Parts
 from submissions.bundle import build_submission
 from submissions.grading_request import GradingRequest
 from submissions.part_fitting import find_empty_parts, find_missing_part
 from submissions.raw_files import MEGABYTE, UploadedFile, read_uploaded, sanitise_name
 from submissions.student_identity import Student
-from submissions.submission import PART_FILES
+from submissions.submission import PART_FILES, Submission
 
 __all__ = ["AcceptedSubmission"]
 
@@ -54,16 +54,24 @@ class SubmissionTarget:
 
     def read(self, files: Sequence[UploadedFile]) -> GradingRequest:
         """Read the submission in these files. Raises UsageError if they are not a valid one."""
-        if not files:
-            raise UsageError("no files were submitted; select a file, or paste a program.")
-        source = sanitise_name(", ".join(dict.fromkeys(each.flat_name for each in files)))
-        assignment = self.assignment
-        submission = build_submission(
-            read_uploaded(files, source), source, self.student.id, assignment.id, assignment.parts
-        )
-        for name in find_empty_parts(submission):
-            raise UsageError("%(name)s is empty, expected a program.", name=name)
-        return GradingRequest(submission, assignment, source, listed_student=self.student)
+        submission, source = read_sent_files(files, self.student.id, self.assignment.id, self.assignment.parts)
+        return GradingRequest(submission, self.assignment, source, listed_student=self.student)
+
+
+def read_sent_files(
+    files: Sequence[UploadedFile], student: str, assignment: str, parts: Parts
+) -> tuple[Submission, str]:
+    """Return the submission in these files, fitted to ``parts``, and the names of the files.
+
+    Raises UsageError if they are not a valid submission.
+    """
+    if not files:
+        raise UsageError("no files were submitted; select a file, or paste a program.")
+    source = sanitise_name(", ".join(dict.fromkeys(each.flat_name for each in files)))
+    submission = build_submission(read_uploaded(files, source), source, student, assignment, parts)
+    for name in find_empty_parts(submission):
+        raise UsageError("%(name)s is empty, expected a program.", name=name)
+    return submission, source
 
 
 def load_submission_target(service: Service, actor: Actor, course_id: int, assignment: str) -> SubmissionTarget:

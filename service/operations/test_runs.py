@@ -4,36 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from sqlalchemy.orm import Session
 
+from service.operations import own_submissions
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
-from service.operations.lookup import require_own_enrolment
-from service.operations.own_views import load_visible_assignment
+from service.operations.lookup import require_own_enrolment, require_own_submission
+from service.operations.own_submissions import Allowance
+from service.operations.own_views import is_assignment_open, load_visible_assignment
 from service.operations.submissions import load_submission_target
+from service.reports.start_picture import StartPicture, build_start_picture
 from service.store.queue import test_runs
 from service.store.queue.test_runs import StudentTestRun
 from service.store.states import Role
 from service.test_runs import build_single_trial_assignment
 from sim.errors import UsageError
+from submissions.assignment.starter import read_starter
 from submissions.assignment.task_sheet import TaskSheet, build_task_sheet
 from submissions.raw_files import UploadedFile
 from submissions.stored_submission import pack_submission, unpack_submission
-from submissions.submission import Submission
 
 __all__ = ["StudentTestRun"]
 
 
+class TextOrigin(StrEnum):
+    """The program that a student continues with."""
+
+    STARTER = "starter"
+    ATTEMPT = "attempt"
+    TEST_RUN = "test-run"
+
+
 @dataclass(frozen=True, slots=True)
 class TestRunView:
-    """A student's newest test run of an assignment, and the assignment's task."""
+    """An assignment's task, the student's newest test run of it, and the texts to continue with.
+
+    ``origins`` are the programs that exist; ``texts`` are those of ``origin``, in the order of the requested files.
+    """
 
     sheet: TaskSheet
     seconds: float | None  # simulated; None without a scenario visible to students
+    picture: StartPicture | None
+    allowance: Allowance
+    is_open: bool
     line: StudentTestRun | None
     replay: bytes | None  # compressed
-    submission: Submission | None
+    origins: tuple[TextOrigin, ...]
+    origin: TextOrigin | None
+    texts: tuple[str, ...]
 
 
 def start(service: Service, actor: Actor, course_id: int, assignment: str, files: Sequence[UploadedFile]) -> str:
@@ -54,23 +74,59 @@ def start(service: Service, actor: Actor, course_id: int, assignment: str, files
     return test_run_id
 
 
-def show_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> TestRunView:
-    """Return the actor's newest test run of an assignment, with its program. Raises NotFound if they may not see it."""
+def show_newest(
+    service: Service, actor: Actor, course_id: int, assignment: str, origin: TextOrigin | None = None
+) -> TestRunView:
+    """Return the actor's newest test run of an assignment, and the texts of ``origin``, by default the latest.
+
+    Raises NotFound if they may not see the assignment.
+    """
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
+        sheet = build_task_sheet(visible_assignment)
+        allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
+        is_open = is_assignment_open(session, course_id, assignment)
         newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
         line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
         replay = test_runs.load_replay(session, newest_id) if newest_id else None
-        submission = unpack_submission(test_runs.load_program(session, newest_id)[0]) if newest_id else None
+        texts_by_origin = _load_texts(session, actor, course_id, sheet, line)
     trial_assignment = build_single_trial_assignment(visible_assignment)
+    shown_origin = origin if origin in texts_by_origin else next(iter(texts_by_origin), None)
     return TestRunView(
-        build_task_sheet(visible_assignment),
+        sheet,
         trial_assignment.scenarios[0].seconds if trial_assignment else None,
+        build_start_picture(trial_assignment) if trial_assignment else None,
+        allowance,
+        is_open,
         line,
         replay,
-        submission,
+        tuple(each for each in TextOrigin if each in texts_by_origin),
+        shown_origin,
+        texts_by_origin[shown_origin] if shown_origin else ("",) * len(sheet.asked),
     )
+
+
+def _load_texts(
+    session: Session, actor: Actor, course_id: int, sheet: TaskSheet, line: StudentTestRun | None
+) -> dict[TextOrigin, tuple[str, ...]]:
+    """Return the texts of the newest test run, the newest attempt and the starter files, the latest first."""
+    enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
+    attempts = own_submissions.load_own_attempts(session, enrolment_id, sheet.id).newest
+    packed_programs = []
+    if line is not None:
+        packed_programs.append((line.queued_at, TextOrigin.TEST_RUN, test_runs.load_program(session, line.id)[0]))
+    if attempts:
+        row = require_own_submission(session, actor, course_id, attempts[0].id)
+        packed_programs.append((attempts[0].submitted_at, TextOrigin.ATTEMPT, row.packed))
+    texts = {
+        origin: unpack_submission(packed).read_texts(sheet.asked)
+        for _, origin, packed in sorted(packed_programs, key=lambda each: each[0], reverse=True)
+    }
+    starter = read_starter(sheet.id)
+    texts[TextOrigin.STARTER] = tuple(starter.get(name, "") for name in sheet.asked)
+    # A notebook has no such files.
+    return {origin: each for origin, each in texts.items() if any(each)}
 
 
 def find_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> StudentTestRun | None:
@@ -97,9 +153,8 @@ def show_replay(service: Service, actor: Actor, course_id: int, tryout_id: str) 
 
 
 def _require_test_run(session: Session, actor: Actor, course_id: int, tryout_id: str) -> StudentTestRun:
-    line = test_runs.find_student_run(
-        session, require_own_enrolment(session, actor, course_id, Role.STUDENT).id, tryout_id
-    )
+    enrolment = require_own_enrolment(session, actor, course_id, Role.STUDENT, Role.INSTRUCTOR)
+    line = test_runs.find_student_run(session, enrolment.id, tryout_id)
     if line is None:
         raise NotFound("There is no such page or item, or you have no access to it.")
     return line

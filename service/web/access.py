@@ -201,15 +201,21 @@ def _require_student(course_id: RowNumber, reader: SignedInReader, context: Cont
     return ReaderInCourse(reader, course.id, course.name)
 
 
+def _require_member(course_id: RowNumber, reader: SignedInReader, context: Context) -> ReaderInCourse:
+    is_instructor = reader.identity.roles.get(course_id) is Role.INSTRUCTOR
+    return (_require_instructor if is_instructor else _require_student)(course_id, reader, context)
+
+
 def _require_operator(reader: SignedInReader) -> Reader:
     if not reader.identity.operator:
         raise build_not_found()
     return reader
 
 
-#: An instructor of the course in the path, a student of it, and an operator.
+#: An instructor of the course in the path, a student of it, either of them, and an operator.
 CourseInstructor = Annotated[ReaderInCourse, Depends(_require_instructor)]
 CourseStudent = Annotated[ReaderInCourse, Depends(_require_student)]
+CourseMember = Annotated[ReaderInCourse, Depends(_require_member)]
 OperatorReader = Annotated[Reader, Depends(_require_operator)]
 
 

@@ -97,6 +97,17 @@ def require_role(role: Role, scope: str) -> Callable[[int, Caller, Context], Cal
     return caller_in_course
 
 
+def require_member(scope: str) -> Callable[[int, Caller, Context], CallerInCourse]:
+    """Return a dependency that requires any role in the path's course and a token scope."""
+    require_scoped_caller = require_scope(scope)
+
+    def member(course_id: RowNumber, caller: AuthenticatedCaller, context: Context) -> CallerInCourse:
+        course = courses.show_membership(context.service, caller.actor, course_id)
+        return CallerInCourse(require_scoped_caller(caller), course.id)
+
+    return member
+
+
 def require_operator(scope: str) -> Callable[[Caller], Caller]:
     """Return a dependency that requires an operator and a token scope."""
     require_scoped_caller = require_scope(scope)

@@ -50,17 +50,17 @@ class BodyTooLarge(TranslatableHTTPException):
 
 @dataclass(frozen=True, slots=True)
 class UploadLimit:
-    """The maximum size in bytes of a route's upload, and the course role that may send it."""
+    """The maximum size in bytes of a route's upload, and the course roles that may send it."""
 
     most: int
-    role: Role
+    roles: tuple[Role, ...]
 
 
-def takes_upload(max_bytes: int, role: Role) -> Callable[[_Endpoint], _Endpoint]:
+def takes_upload(max_bytes: int, *roles: Role) -> Callable[[_Endpoint], _Endpoint]:
     """Declare that an endpoint accepts bodies of up to ``max_bytes`` bytes. All others accept ``MAX_FORM_BYTES``."""
 
     def declared(endpoint: _Endpoint) -> _Endpoint:
-        setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(max_bytes, role))
+        setattr(endpoint, _UPLOAD_ATTRIBUTE, UploadLimit(max_bytes, roles))
         return endpoint
 
     return declared
@@ -122,7 +122,7 @@ def _check_sender(request: Request, upload: UploadLimit | None, course: str) -> 
     identity = _find_identity(request)
     if identity is None:
         raise SignInNeeded("sign in first")
-    if upload is not None and find_course_role(identity, course) is not upload.role:
+    if upload is not None and find_course_role(identity, course) not in upload.roles:
         raise build_not_found()
 
 

@@ -13,6 +13,7 @@ from sqlalchemy import ColumnElement, CursorResult, and_, delete, func, or_, sel
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
+from service.store.queue.run_programs import split_program
 from service.store.revision import needs_newer_code
 from service.store.states import RunState
 from service.store.tables.courses import AssignmentVersion
@@ -65,8 +66,8 @@ class StudentTestRun:
         return self.state.value in _UNFINISHED
 
 
-def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_submission: bytes) -> str:
-    """Queue a program for a test run and return its id.
+def queue_test_run(session: Session, enrolment_id: int, version_id: int, stored_program: bytes) -> str:
+    """Queue a program for a test run and return its id. ``run_programs.py`` has the form of the program.
 
     Raises UsageError if the student has an unfinished one, or too many within an hour.
     """
@@ -91,7 +92,7 @@ def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_
     row = Tryout(
         enrolment_id=enrolment_id,
         assignment_version_id=version_id,
-        packed=packed_submission,
+        packed=stored_program,
         state=RunState.QUEUED.value,
         queued_at=current_time,
     )
@@ -183,12 +184,13 @@ def measure_queue(session: Session) -> QueuedTestRuns:
 
 
 def load_program(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
-    """Return the packed program and the encoded assignment of a test run."""
+    """Return the packed submission and the encoded assignment of a test run."""
     query = select(Tryout.packed, AssignmentVersion.content).join(
         AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id
     )
-    packed_submission, content = session.execute(query.where(Tryout.id == tryout_id)).one()
-    return packed_submission, content
+    stored_program, content = session.execute(query.where(Tryout.id == tryout_id)).one()
+    packed_submission, own_content = split_program(stored_program)
+    return packed_submission, content if own_content is None else own_content
 
 
 def find_newest_run(session: Session, enrolment_id: int, assignment: str) -> str | None:

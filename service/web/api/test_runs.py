@@ -1,4 +1,4 @@
-"""API of test runs: start one, follow its progress and read its output. A test run has no marks."""
+"""API of test runs and runs in the playground: start one, follow its progress and read its output, without marks."""
 
 from __future__ import annotations
 
@@ -10,22 +10,24 @@ from fastapi import Depends, Query, Request
 from fastapi.responses import Response
 from pydantic import Field
 
-from service.operations import test_runs
+from service.operations import playground, test_runs
+from service.operations.playground import DEFAULT_WORLD, RANGES, PlaygroundRequest
 from service.operations.test_runs import StudentTestRun
 from service.operations.types import Role, RunState
 from service.web.access import RowName
 from service.web.api.grades import REPLAY_RESPONSES
 from service.web.api.shapes import Shape, build_example_config
-from service.web.api_access import CallerInCourse, require_role
+from service.web.api_access import CallerInCourse, require_member, require_role
 from service.web.api_routes import api_router, respond_with_etag
 from service.web.api_uploads import MAX_SUBMISSION_BYTES, SENT_BODY, SentFiles
 from service.web.context import Context
 from service.web.request_bodies import takes_upload
-from service.web.student_submissions import start_test_run
+from service.web.student_submissions import start_playground_run, start_test_run
 
 router = api_router("mine")
-ReadAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "read"))]
+ReadAccess = Annotated[CallerInCourse, Depends(require_member("read"))]
 SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "submit"))]
+MemberSubmitAccess = Annotated[CallerInCourse, Depends(require_member("submit"))]
 PREFIX = "/courses/{course_id}/mine/tryouts"
 
 
@@ -33,7 +35,7 @@ class TestRunShape(Shape):
     """A test run of a program."""
 
     id: str
-    assignment: str
+    assignment: str = Field(description="Id of the assignment; `Playground` for a run in the playground.")
     state: RunState
     queued_at: datetime
     before: int = Field(description="Number of test runs ahead in the queue.")
@@ -67,6 +69,30 @@ def ask(
     A test run has no marks and does not count as an attempt.
     """
     test_run_id = start_test_run(context, access.actor, access.course_id, assignment, uploaded_files)
+    return _to_test_run_shape(test_runs.show(context.service, access.actor, access.course_id, test_run_id))
+
+
+@router.post("/courses/{course_id}/playground", status_code=201, openapi_extra=SENT_BODY)
+@takes_upload(MAX_SUBMISSION_BYTES, Role.STUDENT, Role.INSTRUCTOR)
+def run_in_playground(
+    access: MemberSubmitAccess,
+    context: Context,
+    uploaded_files: SentFiles,
+    floor: Annotated[str, Query(max_length=100, examples=["Simple_Shapes"])] = DEFAULT_WORLD.floor,
+    x: Annotated[
+        float | None, Query(ge=0, le=RANGES["x"], description="Start in mm, by default that of the floor.")
+    ] = None,
+    y: Annotated[float | None, Query(ge=0, le=RANGES["y"], description="Start in mm.")] = None,
+    heading: Annotated[float | None, Query(ge=0, le=RANGES["heading"], description="Degrees, anticlockwise.")] = None,
+    light_noise: Annotated[
+        float, Query(ge=0, le=RANGES["light_noise"], description="Noise of the light sensors.")
+    ] = 0.0,
+    motor_noise: Annotated[float, Query(ge=0, le=RANGES["motor_noise"], description="Noise of the motors.")] = 0.0,
+) -> TestRunShape:
+    """Run a program on any floor, without an assignment. It is a test run, within the same limits."""
+    world = playground.place_on_floor(floor).change((x, y, heading), light_noise, motor_noise)
+    request = PlaygroundRequest(world, uploaded_files)
+    test_run_id = start_playground_run(context, access.actor, access.course_id, request)
     return _to_test_run_shape(test_runs.show(context.service, access.actor, access.course_id, test_run_id))
 
 

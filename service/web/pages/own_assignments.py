@@ -31,7 +31,6 @@ from service.web.rendering import render_page
 from service.web.request_bodies import takes_upload
 from service.web.student_submissions import submit
 from sim.errors import UsageError
-from submissions.assignment.task_sheet import TaskSheet
 from submissions.raw_files import UploadedFile
 
 router = APIRouter()
@@ -79,7 +78,7 @@ def submit_own_files(
     """Submit the chosen files and typed texts, and redirect to the submission's page."""
     sheet = own_views.show_sheet(context.service, access.actor, access.course_id, assignment)
     try:
-        submission_request = SubmissionRequest(assignment, collect_sent_files(sheet, files, texts), even_in_part)
+        submission_request = SubmissionRequest(assignment, collect_sent_files(sheet.asked, files, texts), even_in_part)
         accepted_submission = submit(context, access.actor, access.course_id, submission_request)
     except NotFound:
         raise
@@ -104,7 +103,7 @@ def download_given_file(access: CourseStudent, context: Context, assignment: str
     )
 
 
-def collect_sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Sequence[str]) -> list[UploadedFile]:
+def collect_sent_files(asked: Sequence[str], files: Sequence[UploadFile], texts: Sequence[str]) -> list[UploadedFile]:
     """Return the submitted files of a form: the chosen files, and each typed text under the name of its file.
 
     Raises:
@@ -113,7 +112,7 @@ def collect_sent_files(sheet: TaskSheet, files: Sequence[UploadFile], texts: Seq
     chosen_files = [UploadedFile(each.filename, each.file) for each in files if each.filename]
     typed_files = [
         UploadedFile(name, BytesIO(text.replace("\r\n", "\n").encode()))
-        for name, text in zip(sheet.asked, texts, strict=False)
+        for name, text in zip(asked, texts, strict=False)
         if text.strip()
     ]
     names = {each.flat_name.lower() for each in chosen_files}
@@ -150,7 +149,6 @@ def _render_assignment(
         allowance=task.allowance,
         is_open=task.is_open,
         can_try=task.can_test_run,
-        has_tried=task.has_test_run,
         rejection=rejection,
     )
     page.headers.update(rejection.headers if rejection else {})

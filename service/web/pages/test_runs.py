@@ -1,46 +1,52 @@
-"""Test runs: the form, the progress, the output and the replay. A test run has no marks."""
+"""Test runs: the editors, the progress, the output and the replay. A test run has no marks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Annotated
 
-from fastapi import APIRouter, Request
-from fastapi.responses import RedirectResponse, Response
-from starlette.exceptions import HTTPException
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import Response
 
 from service.operations import own_views, test_runs
-from service.operations.errors import NotFound
+from service.operations.test_runs import TextOrigin
 from service.operations.types import Role
-from service.reports.html import render_replay_section
+from service.reports.display_text import join_wrapped_lines
 from service.web.access import CourseStudent, ReaderInCourse
 from service.web.api_uploads import MAX_SUBMISSION_BYTES
 from service.web.context import Context, WebContext
-from service.web.errors import describe_error
-from service.web.http_errors import extract_message
-from service.web.language import detect_language
 from service.web.pages.own_assignments import Files, Texts, collect_sent_files
 from service.web.rendering import is_htmx_request, render_page
 from service.web.request_bodies import takes_upload
+from service.web.run_responses import (
+    Rejection,
+    describe_run,
+    find_rejection,
+    render_progress,
+    respond_to_start,
+)
 from service.web.student_submissions import start_test_run
-from sim.errors import UsageError
-from submissions.assignment.task_sheet import TaskSheet
-from submissions.submission import PART_FILES, Submission
 
 router = APIRouter()
 
 
 @router.get("/courses/{course_id}/mine/{assignment}/try")
-def show_newest_test_run(request: Request, access: CourseStudent, context: Context, assignment: str) -> Response:
-    """Show the newest test run, with its program in the form for the next one.
+def show_newest_test_run(
+    request: Request,
+    access: CourseStudent,
+    context: Context,
+    assignment: str,
+    origin: Annotated[TextOrigin | None, Query(alias="from")] = None,
+) -> Response:
+    """Show the newest test run, and the editors with the chosen program, by default the latest.
 
-    Requests from htmx get only the progress, or an instruction to reload the page when the run has ended.
+    Requests from htmx get only the progress or the result.
     """
-    if not is_htmx_request(request):
-        return _render_test_run(request, access, context, assignment)
-    line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
-    if line is None or not line.waits:
-        return Response(headers={"hx-refresh": "true"})
-    return render_page(request, access.reader, "test_run_progress.html", access=access, line=line)
+    if is_htmx_request(request):
+        line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
+        if line is None or line.waits:
+            return render_progress(request, access, line)
+    return _render_test_run(request, access, context, assignment, origin=origin)
 
 
 @router.post("/courses/{course_id}/mine/{assignment}/try")
@@ -50,20 +56,16 @@ def submit_test_run(
 ) -> Response:
     """Start a test run of the chosen files and typed texts."""
     sheet = own_views.show_sheet(context.service, access.actor, access.course_id, assignment)
-    try:
-        start_test_run(context, access.actor, access.course_id, assignment, collect_sent_files(sheet, files, texts))
-    except NotFound:
-        raise
-    except UsageError as error:
-        return _render_test_run(
-            request, access, context, assignment, 422, describe_error(error, detect_language(request)), texts
-        )
-    except HTTPException as error:
-        if error.status_code != 429:
-            raise
-        sentence = detect_language(request).translate_sentence(extract_message(error))
-        return _render_test_run(request, access, context, assignment, 429, sentence, texts, error.headers)
-    return RedirectResponse(str(request.url.path), 303)
+    rejection = find_rejection(
+        request,
+        lambda: start_test_run(
+            context, access.actor, access.course_id, assignment, collect_sent_files(sheet.asked, files, texts)
+        ),
+    )
+    if rejection is not None and not is_htmx_request(request):
+        return _render_test_run(request, access, context, assignment, rejection=rejection, typed_texts=texts)
+    line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
+    return respond_to_start(request, access, rejection, line)
 
 
 def _render_test_run(
@@ -71,37 +73,31 @@ def _render_test_run(
     access: ReaderInCourse,
     context: WebContext,
     assignment: str,
-    status: int = 200,
-    message: str = "",
+    *,
+    origin: TextOrigin | None = None,
+    rejection: Rejection | None = None,
     typed_texts: Sequence[str] = (),
-    headers: Mapping[str, str] | None = None,
 ) -> Response:
-    view = test_runs.show_newest(context.service, access.actor, access.course_id, assignment)
+    view = test_runs.show_newest(context.service, access.actor, access.course_id, assignment, origin)
+    has_program = view.origin is TextOrigin.TEST_RUN and not typed_texts
+    template = "run_result.html" if is_htmx_request(request) else "test_run.html"
     page = render_page(
         request,
         access.reader,
-        "test_run.html",
-        status_code=status,
+        template,
+        status_code=rejection.status if rejection else 200,
         access=access,
         sheet=view.sheet,
+        description=join_wrapped_lines(view.sheet.description),
         seconds=view.seconds,
-        line=view.line,
-        replay=render_replay_section(view.replay, detect_language(request)) if view.replay else None,
-        rejection=message,
-        texts=list(typed_texts) or (_read_texts(view.sheet, view.submission) if view.submission else []),
+        picture=view.picture,
+        allowance=view.allowance,
+        is_open=view.is_open,
+        origins=view.origins,
+        origin=view.origin,
+        rejection=rejection,
+        texts=list(typed_texts) or view.texts,
+        **describe_run(request, view.line, view.replay, view.sheet.asked, has_program=has_program),
     )
-    page.headers.update(headers or {})
+    page.headers.update(rejection.headers if rejection else {})
     return page
-
-
-def _read_texts(sheet: TaskSheet, submission: Submission) -> list[str]:
-    """Return the texts of the test run's files, in the order of the requested files.
-
-    A missing file gives an empty text.
-    """
-    parts = {PART_FILES["program"]: submission.program, PART_FILES["responder"]: submission.responder}
-    texts = []
-    for name in sheet.asked:
-        code = parts.get(name)
-        texts.append(code.text if code is not None else submission.files.get(name, b"").decode("utf-8", "replace"))
-    return texts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import report_builders
 from interfaces import Row
-from service.operations import appeals, grades, submissions, test_runs
+from service.operations import appeals, grades, playground, submissions, test_runs
 
 _CRITERION = report_builders.faulty_grade().criteria[0].id
 _STUDENTS = "students have no commands on the machine"
@@ -12,6 +12,7 @@ _BOTH = {
     "files:robot.py": "print('hello')\n",
     "files:responder.py": "def responder(msg):\n    return msg\n",
 }
+_LOOP = "floor=Loop&x=500&y=400&heading=90&light_noise=10&motor_noise=0"
 _CHANGED = (409, "another person changed the marks")
 
 
@@ -123,6 +124,21 @@ def _send(
     )
 
 
+def _play(
+    files: dict[str, str], world: str, refused: tuple[int, str] | None = None, who: str = "ada", state: str = "course"
+) -> Row:
+    return Row(
+        playground.start,
+        ("playground", dict(each.split("=") for each in world.split("&"))),
+        ("POST", f"playground?{world}", "files"),
+        alone=_STUDENTS,
+        who=who,
+        state=state,
+        files=files,
+        refused=refused,
+    )
+
+
 ROWS = {
     "set marks": _set("1", "seen again", 0),
     "set marks again": _set("2", "seen again", 1, state="marked"),
@@ -157,5 +173,11 @@ ROWS = {
     "submit an empty program": _send(submissions.submit, _BOTH | {"files:robot.py": " "}, (422, "is empty")),
     "submit to what is closed": _send(submissions.submit, _BOTH, (422, "closed"), "closed"),
     "start a test run": _send(test_runs.start, _BOTH),
+    "run in the playground": _play(_BOTH, _LOOP),
+    "run in the playground as staff": _play({"files:robot.py": "print('hello')\n"}, _LOOP, who="grace"),
+    "run in the playground beside a test": _play(_BOTH, _LOOP, (422, "is not completed yet"), state="running a test"),
+    "run on no such floor": _play(_BOTH, _LOOP.replace("Loop", "Lop"), (422, "there is no floor called")),
+    "run beside the floor": _play(_BOTH, _LOOP.replace("x=500", "x=5000"), (422, "")),
+    "run nothing": _play({}, _LOOP, (422, "no files were submitted")),
     "start two test runs": _send(test_runs.start, _BOTH, (422, "is not completed yet"), "running a test"),
 }  # fmt: skip

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 
 import pytest
 from sqlalchemy import func, select, update
 
 from builders import echo, grading_request
-from service.store.courses.assignment_versions import assignment_from_bytes, freeze_assignment, store_version
+from service.store.courses.assignment_versions import (
+    assignment_from_bytes,
+    assignment_to_bytes,
+    freeze_assignment,
+    store_version,
+)
 from service.store.engine import Store, now
 from service.store.people.students import Students, ensure_course
 from service.store.queue import test_runs
+from service.store.queue.run_programs import add_assignment
 from service.store.queue.test_runs import MAX_TEST_RUNS_PER_HOUR, StudentTestRun
 from service.store.states import RunState
 from service.store.tables.submissions import Tryout
@@ -138,3 +145,32 @@ def test_of_what_a_student_tries_the_newest_program_is_kept(store: Store) -> Non
     with store.reading() as session:
         sizes = {row.id: len(row.packed) for row in session.scalars(select(Tryout))}
     assert [sizes[each] > 0 for each in tried] == [True, False, False, True]
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])
+def test_many_students_at_once_are_each_run_before_one_of_them_is_run_again(store: Store, count: int) -> None:
+    """A student who starts the next run as soon as one has ended waits behind all others each time."""
+    eager = _enrolled(store, "eager")
+    owners = {_ask(store, eager): "eager"}
+    owners |= {_ask(store, _enrolled(store, f"student {number}")): "another" for number in range(count - 1)}
+    order: list[str] = []
+    while (claimed := test_runs.claim_test_run(store, 60)) is not None and len(order) < count + 2:
+        order.append(owners[claimed.id])
+        assert test_runs.finish_test_run(store, claimed, {}, None)
+        if owners[claimed.id] == "eager":
+            owners[_ask(store, eager)] = "eager"
+    assert [place for place, owner in enumerate(order) if owner == "eager"] == [0, count, count + 1]
+
+
+def test_runs_with_a_world_of_their_own_count_in_the_same_limits(store: Store) -> None:
+    ada = _enrolled(store)
+    other = replace(echo(), id="another", title="Another")
+    stored = add_assignment(PACKED, assignment_to_bytes(other))
+    frozen = freeze_assignment(echo())
+    with store.transaction() as session:
+        version_id = store_version(session, frozen, now(session))
+        run = test_runs.queue_test_run(session, ada, version_id, stored)
+        packed, content = test_runs.load_program(session, run)
+    assert (packed, assignment_from_bytes(content).id) == (PACKED, "another")
+    with pytest.raises(UsageError, match="is not completed yet"):
+        _ask(store, ada)

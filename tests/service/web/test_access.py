@@ -36,6 +36,7 @@ ALLOWED = {
     "signed-in": set(READERS) - {"nobody"},
     "instructor": {"instructor"},
     "student": {"owner", "other student"},
+    "member": {"owner", "other student", "instructor"},
     "owner": {"owner"},
     "operator": {"operator"},
 }
@@ -163,7 +164,7 @@ def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: st
     web, signed_requests = signed
     method, path = route.split(" ", 1)
     who, scope = ROUTES[route].split(" ")
-    reader = {"signed-in": "owner", "student": "owner"}.get(who, who)
+    reader = {"signed-in": "owner", "student": "owner", "member": "owner"}.get(who, who)
     members = {"owner": web.student("ada"), "instructor": web.instructor(), "operator": web.operator()}
     token = web.token(members[reader], *({"read", "submit", "mark", "manage"} - {scope}))
     answer = signed_requests.browsers["nobody"].request(method, filled(path, signed_requests.values), headers=token)

@@ -31,6 +31,7 @@ _UPLOADS = {
     "POST /api/v1/courses/{course_id}/assignments/uploads": 130,
     "POST /api/v1/courses/{course_id}/mine/submissions": 34,
     "POST /api/v1/courses/{course_id}/mine/tryouts": 34,
+    "POST /api/v1/courses/{course_id}/playground": 34,
     "POST /api/v1/courses/{course_id}/batches": 200,
     "POST /api/v1/courses/{course_id}/batches/preflight": 200,
     "POST /api/v1/courses/{course_id}/batches/{batch_id}/worksheet": 11,
@@ -40,6 +41,7 @@ _UPLOADS = {
     "POST /courses/{course_id}/mine/{assignment}": 34,
     "POST /courses/{course_id}/mine/{assignment}/try": 34,
     "POST /courses/{course_id}/people/table": 11,
+    "POST /courses/{course_id}/playground": 34,
 }
 
 
@@ -172,7 +174,7 @@ def test_nothing_is_read_of_an_upload_that_its_route_refuses(
     route: str, world: tuple[Web, dict[str, str], dict[str, Member]]
 ) -> None:
     web, values, members = world
-    other = members["owner" if ROUTES[route].startswith("instructor") else "instructor"]
+    other = members[{"instructor": "owner", "member": "operator"}.get(ROUTES[route], "instructor")]
     browser = web.browser(other)
     headers = {"cookie": f"robomark={browser.cookies['robomark']}", "content-type": "multipart/form-data; boundary=x"}
     assert _request_route(web, route, values, headers, 3) == _Seen(404, 0)

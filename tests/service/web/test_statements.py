@@ -36,6 +36,7 @@ _READERS = {
     "anybody": ("nobody",),
     "signed-in": ("ada", "grace", "root"),
     "student": ("ada",),
+    "member": ("ada", "grace"),
     "owner": ("ada",),
     "instructor": ("grace",),
     "operator": ("root",),

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from browsing import DESKTOP, PHONE, assert_in_order, chromium, follow
-from builders import settings_in
 from paths import ROOT
-from service.queue.embedded_services import EmbeddedServices
-from service.store.courses import open_assignments
-from service.store.courses.assignment_versions import freeze_assignment
-from service.store.engine import open_store
-from service.web.app import make_app
-from serving import served
-from submissions.assignment.reader import find_assignment
-from web import Web
+from serving import Site, site_with_worker
 
 pytestmark = pytest.mark.long
 
@@ -32,25 +23,10 @@ SOUGHT = "() => Number(document.querySelector('.moment').value) > 0"
 MOMENT = "() => [location.hash, document.querySelector('.moment').value]"
 
 
-@dataclass(frozen=True, slots=True)
-class Served:
-    """A web application with a worker, and its address."""
-
-    web: Web
-    address: str
-
-
 @pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    settings = settings_in(tmp_path_factory.mktemp("home"), concurrency=1)
-    with open_store(settings) as store, EmbeddedServices(settings, store) as services:
-        web = Web(services.settings, store, make_app(services.settings, store))
-        web.instructor()
-        with store.transaction() as session:
-            open_assignments.prepare_assignment(session, 1, freeze_assignment(find_assignment(ASSIGNMENT)))
-            open_assignments.open_for_students(session, 1, ASSIGNMENT)
-        with served(web.app) as address:
-            yield Served(web, address)
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    with site_with_worker(tmp_path_factory.mktemp("home"), ASSIGNMENT) as site:
+        yield site
 
 
 @pytest.fixture(scope="module")
@@ -59,17 +35,12 @@ def browser() -> Iterator[Browser]:
         yield started
 
 
-def _page(browser: Browser, running: Served, student: str, **context: object) -> Page:
+def _page(browser: Browser, running: Site, student: str, **context: object) -> Page:
     """Return a phone signed in as a student, on the page of the student's work."""
-    page = browser.new_context(**{**PHONE, **context}).new_page()
-    page.on("pageerror", lambda error: pytest.fail(str(error)))
-    page.goto(f"{running.address}/sign-in/{running.web.link(running.web.student(student))}")
-    page.locator("main button").click()
-    page.wait_for_url("**/mine")
-    return page
+    return running.sign_in(browser, running.web.student(student), **{**PHONE, **context})
 
 
-def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Served) -> None:
+def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Site) -> None:
     page = _page(browser, running, "ada")
     follow(page.get_by_role("link", name="Ignore the bands"))
     assert_in_order(page)
@@ -119,7 +90,7 @@ def test_from_the_upload_to_the_second_that_failed(browser: Browser, running: Se
     assert_in_order(page)
 
 
-def test_a_program_is_tried_without_a_mark(browser: Browser, running: Served) -> None:
+def test_a_program_is_tried_without_a_mark(browser: Browser, running: Site) -> None:
     page = _page(browser, running, "bob")
     follow(page.get_by_role("link", name="Ignore the bands"))
     page.locator("summary").click()
@@ -127,9 +98,9 @@ def test_a_program_is_tried_without_a_mark(browser: Browser, running: Served) ->
     page.get_by_role("button", name="Run without submitting").click()
     page.wait_for_selector("section.replay[data-ready]", timeout=PATIENCE)
     assert_in_order(page)
-    expect(page.locator("#tried")).to_contain_text("NameError: name 'undefined' is not defined")
-    expect(page.locator("#tried pre").first).to_contain_text("begun")
-    expect(page.get_by_label("robot.py")).to_have_value(FAILS)
+    expect(page.locator("#result")).to_contain_text("NameError: name 'undefined' is not defined")
+    expect(page.locator("#result pre").first).to_contain_text("begun")
+    expect(page.locator("#text1")).to_have_value(FAILS)
     page.get_by_role("link", name="Watch the replay").first.click()
     page.wait_for_function(SOUGHT)
     assert page.evaluate(MOMENT) == ["#trial=1&t=2.000", "2"]
@@ -137,7 +108,7 @@ def test_a_program_is_tried_without_a_mark(browser: Browser, running: Served) ->
     expect(page.locator(".cards")).to_contain_text("No submissions yet.")
 
 
-def test_all_of_it_works_without_javascript(browser: Browser, running: Served) -> None:
+def test_all_of_it_works_without_javascript(browser: Browser, running: Site) -> None:
     page = _page(browser, running, "cid", java_script_enabled=False)
     follow(page.get_by_role("link", name="Ignore the bands"))
     page.set_input_files("#files", {"name": "robot.py", "mimeType": "text/x-python", "buffer": REFERENCE.encode()})
@@ -148,4 +119,4 @@ def test_all_of_it_works_without_javascript(browser: Browser, running: Served) -
     page.locator("summary").click()
     page.get_by_label("robot.py").fill(FAILS)
     page.get_by_role("button", name="Run without submitting").click()
-    expect(page.locator("#tried")).to_contain_text("NameError", timeout=PATIENCE)
+    expect(page.locator("#result")).to_contain_text("NameError", timeout=PATIENCE)
