@@ -53,10 +53,9 @@ def describe_line(name: str, line: int) -> Sentence:
 
 def find_line(message: str) -> tuple[str, int] | None:
     """Return the name of the file or cell and the line with which a message begins; None if it begins otherwise."""
-    match find_opening(message, _LINE):
-        case Sentence(values={"name": name, "line": int(line)}):
-            return str(name), line
-    return None
+    place = find_opening(message, _LINE)
+    line = None if place is None else place.values["line"]
+    return (str(place.values["name"]), line) if place is not None and isinstance(line, int) else None
 
 
 def describe_place(trial: TrialResult, t: float | None) -> str:
