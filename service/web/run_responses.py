@@ -20,8 +20,10 @@ from service.web.language import detect_language
 from service.web.rendering import is_htmx_request, render_page
 from sim.errors import UsageError
 
-#: A page asks for the result soon after the start of a run, and then less and less often.
-_MIN_INTERVAL, _MAX_INTERVAL = timedelta(milliseconds=250), timedelta(seconds=2)
+_MIN_INTERVAL, _MIN_INTERVAL_OF_LONG_RUNS = timedelta(milliseconds=250), timedelta(seconds=1)
+#: About the time that one run takes.
+_INTERVAL_PER_RUN = timedelta(milliseconds=200)
+_MAX_INTERVAL = timedelta(seconds=10)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,11 @@ def describe_run(
 
 
 def _compute_interval(line: StudentTestRun) -> int:
-    """Return the milliseconds until the page asks again: half of the time that the run has been waiting, in limits."""
+    """Return the milliseconds until the page asks again: soon for the next runs, later for those far back in the queue.
+
+    Otherwise, the pages of a class that starts its runs at once would keep the server busy.
+    """
     waited = datetime.now(UTC) - line.queued_at
-    return round(min(max(waited / 2, _MIN_INTERVAL), _MAX_INTERVAL) / timedelta(milliseconds=1))
+    soonest = min(max(waited / 4, _MIN_INTERVAL), _MIN_INTERVAL_OF_LONG_RUNS)
+    interval = min(max(line.before * _INTERVAL_PER_RUN, soonest), _MAX_INTERVAL)
+    return round(interval / timedelta(milliseconds=1))
