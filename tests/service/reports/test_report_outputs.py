@@ -9,6 +9,7 @@ from decimal import Decimal
 from xml.etree import ElementTree
 
 import pytest
+from rich.text import Text
 
 import report_builders as build
 from responders.sandbox.meter import JobCosts, JobLimits
@@ -229,6 +230,7 @@ def test_a_terminal_shows_the_lines_of_the_text_in_colours() -> None:
     for grade in (build.faulty_grade(), build.hostile_grade(), build.shape_grade()):
         view = build_staff_view(grade)
         coloured = render_coloured_text(view, build.faulty_submission())
+        assert isinstance(coloured, Text)
         assert coloured.plain == render_plain_text(view, build.faulty_submission())
         assert {"bold", "red"} & {str(span.style) for span in coloured.spans}
 
