@@ -169,6 +169,12 @@ def load_own_attempts(session: Session, enrolment_id: int, assignment: str) -> O
     )
 
 
+def find_newest_row(session: Session, enrolment_id: int, assignment: str) -> SubmissionRow | None:
+    """Return a student's newest submission to an assignment, with its files; None if there is none."""
+    is_own = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment)
+    return session.scalar(select(SubmissionRow).where(*is_own).order_by(SubmissionRow.attempt.desc()).limit(1))
+
+
 def find_submission_with_attempts(
     session: Session, enrolment_id: int, submission_id: int
 ) -> tuple[OwnSubmission, OwnAttempts] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from enum import StrEnum
 
 from sqlalchemy.orm import Session
@@ -11,7 +12,7 @@ from sqlalchemy.orm import Session
 from service.operations import own_submissions
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
-from service.operations.lookup import require_own_enrolment, require_own_submission
+from service.operations.lookup import require_own_enrolment
 from service.operations.own_submissions import Allowance
 from service.operations.own_views import is_assignment_open, load_visible_assignment
 from service.operations.submissions import load_submission_target
@@ -27,6 +28,10 @@ from submissions.raw_files import UploadedFile
 from submissions.stored_submission import pack_submission, unpack_submission
 
 __all__ = ["StudentTestRun"]
+
+
+#: Submissions in a batch can have no time.
+_UNKNOWN_TIME = datetime.min.replace(tzinfo=UTC)
 
 
 class TextOrigin(StrEnum):
@@ -54,6 +59,15 @@ class TestRunView:
     origins: tuple[TextOrigin, ...]
     origin: TextOrigin | None
     texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TestRunResult:
+    """A student's newest test run of an assignment, and the names of the files that the assignment asks for."""
+
+    line: StudentTestRun | None
+    replay: bytes | None  # compressed
+    files: tuple[str, ...]
 
 
 def start(service: Service, actor: Actor, course_id: int, assignment: str, files: Sequence[UploadedFile]) -> str:
@@ -90,7 +104,7 @@ def show_newest(
         newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
         line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
         replay = test_runs.load_replay(session, newest_id) if newest_id else None
-        texts_by_origin = _load_texts(session, actor, course_id, sheet, line)
+        texts_by_origin = _load_texts(session, enrolment_id, sheet, line)
     trial_assignment = build_single_trial_assignment(visible_assignment)
     shown_origin = origin if origin in texts_by_origin else next(iter(texts_by_origin), None)
     return TestRunView(
@@ -108,17 +122,15 @@ def show_newest(
 
 
 def _load_texts(
-    session: Session, actor: Actor, course_id: int, sheet: TaskSheet, line: StudentTestRun | None
+    session: Session, enrolment_id: int, sheet: TaskSheet, line: StudentTestRun | None
 ) -> dict[TextOrigin, tuple[str, ...]]:
     """Return the texts of the newest test run, the newest attempt and the starter files, the latest first."""
-    enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-    attempts = own_submissions.load_own_attempts(session, enrolment_id, sheet.id).newest
+    attempt = own_submissions.find_newest_row(session, enrolment_id, sheet.id)
     packed_programs = []
     if line is not None:
         packed_programs.append((line.queued_at, TextOrigin.TEST_RUN, test_runs.load_program(session, line.id)[0]))
-    if attempts:
-        row = require_own_submission(session, actor, course_id, attempts[0].id)
-        packed_programs.append((attempts[0].submitted_at, TextOrigin.ATTEMPT, row.packed))
+    if attempt is not None:
+        packed_programs.append((attempt.submitted_at or _UNKNOWN_TIME, TextOrigin.ATTEMPT, attempt.packed))
     texts = {
         origin: unpack_submission(packed).read_texts(sheet.asked)
         for _, origin, packed in sorted(packed_programs, key=lambda each: each[0], reverse=True)
@@ -127,6 +139,18 @@ def _load_texts(
     texts[TextOrigin.STARTER] = tuple(starter.get(name, "") for name in sheet.asked)
     # A notebook has no such files.
     return {origin: each for origin, each in texts.items() if any(each)}
+
+
+def show_newest_result(service: Service, actor: Actor, course_id: int, assignment: str) -> TestRunResult:
+    """Return the actor's newest test run of an assignment. Raises NotFound if they may not see the assignment."""
+    with service.store.reading() as session:
+        enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
+        sheet = build_task_sheet(load_visible_assignment(session, course_id, enrolment_id, assignment))
+        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
+        if newest_id is None:
+            return TestRunResult(None, None, sheet.asked)
+        line = test_runs.find_student_run(session, enrolment_id, newest_id)
+        return TestRunResult(line, test_runs.load_replay(session, newest_id), sheet.asked)
 
 
 def find_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> StudentTestRun | None:

@@ -46,6 +46,9 @@ def show_newest_test_run(
         line = test_runs.find_newest(context.service, access.actor, access.course_id, assignment)
         if line is None or line.waits:
             return render_progress(request, access, line)
+        result = test_runs.show_newest_result(context.service, access.actor, access.course_id, assignment)
+        run = describe_run(request, result.line, result.replay, result.files, has_program=True)
+        return render_page(request, access.reader, "run_result.html", status_code=200, **run)
     return _render_test_run(request, access, context, assignment, origin=origin)
 
 
@@ -80,11 +83,10 @@ def _render_test_run(
 ) -> Response:
     view = test_runs.show_newest(context.service, access.actor, access.course_id, assignment, origin)
     has_program = view.origin is TextOrigin.TEST_RUN and not typed_texts
-    template = "run_result.html" if is_htmx_request(request) else "test_run.html"
     page = render_page(
         request,
         access.reader,
-        template,
+        "test_run.html",
         status_code=rejection.status if rejection else 200,
         access=access,
         sheet=view.sheet,
