@@ -20,7 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from tutorial_pictures import find_browser, photograph_tutorial
 
-from service.reports.plots.style import FAULT, load_font
+from service.reports.plots.diagram_parts import load_font
+from service.reports.plots.style import FAULT
 from sim.floors import build_floor, list_floor_names
 from submissions.assignment.examples import locate_examples
 

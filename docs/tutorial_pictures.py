@@ -33,7 +33,7 @@ def find_browser() -> str:
 
 
 def photograph_tutorial(folder: Path) -> None:
-    """Write the pictures ``tutorial-*.png`` into a folder. Takes a minute."""
+    """Write the pictures ``tutorial-*.png`` and ``student-editor.png`` into a folder. Takes a minute."""
     browser_path = find_browser()
     # Chromium's own sandbox does not work for root; the pages are our own.
     flags = ["--no-sandbox"] if os.geteuid() == 0 else []
@@ -107,6 +107,14 @@ def _photograph_student(browser: Browser, link: str, work: Path, folder: Path) -
     made = subprocess.check_output(["robomark", "user", "link", "ben"], env=_environment(work), text=True)
     address = link.partition("/sign-in/")[0]
     page = _sign_in(browser, address + made.split()[0])
+    page.goto(f"{address}/courses/1/mine/{_ASSIGNMENT}/try")
+    page.get_by_role("textbox", name="robot.py").click()
+    page.keyboard.press("Control+End")
+    page.keyboard.type("print(mesages)\n")
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.wait_for_selector("section.replay[data-ready]")
+    page.locator(".cm-message").wait_for()
+    _photograph(page, folder / "student-editor.png", 900)
     page.goto(f"{address}/courses/1/mine/{_ASSIGNMENT}")
     page.locator("input[type=file]").set_input_files([work / "class/ada/robot.py", work / "class/ada/responder.py"])
     page.locator("main form.stack button:not([formaction])").first.click()

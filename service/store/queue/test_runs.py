@@ -66,8 +66,8 @@ class StudentTestRun:
         return self.state.value in _UNFINISHED
 
 
-def queue_test_run(session: Session, enrolment_id: int, version_id: int, stored_program: bytes) -> str:
-    """Queue a program for a test run and return its id. ``run_programs.py`` has the form of the program.
+def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_submission: bytes) -> str:
+    """Queue a program for a test run and return its id.
 
     Raises UsageError if the student has an unfinished one, or too many within an hour.
     """
@@ -92,7 +92,7 @@ def queue_test_run(session: Session, enrolment_id: int, version_id: int, stored_
     row = Tryout(
         enrolment_id=enrolment_id,
         assignment_version_id=version_id,
-        packed=stored_program,
+        packed=packed_submission,
         state=RunState.QUEUED.value,
         queued_at=current_time,
     )

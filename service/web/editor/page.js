@@ -30,6 +30,10 @@ async function load(link) {
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   for (const editor of editors) editor.replace(page.getElementById(editor.field.id).value);
   savedTexts = textsNow();
+  // The errors are those of another program.
+  for (const error of document.querySelectorAll("a[data-line]")) error.replaceWith(error.textContent);
+  document.querySelector("a[data-load][aria-current]")?.removeAttribute("aria-current");
+  link.setAttribute("aria-current", "true");
   announce(link.dataset.loaded);
 }
 
