@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Locator, Page, expect
 
-from browsing import DESKTOP, PHONE, assert_in_order, chromium
+from browsing import DESKTOP, PHONE, assert_in_order, chromium, follow
 from serving import Site, site_with_worker
 
 pytestmark = pytest.mark.long
@@ -168,7 +168,8 @@ def test_a_failing_server_is_named_and_the_text_stays(site: Site, browser: Brows
 def test_the_playground_runs_on_the_chosen_floor(site: Site, browser: Browser) -> None:
     complaints: list[str] = []
     page = _open(site, browser, "dan", complaints, **PHONE)
-    page.get_by_role("link", name="Playground").click()
+    follow(page.get_by_role("link", name="Playground"))
+    page.wait_for_load_state("networkidle")
     page.get_by_label("Floor", exact=True).select_option("Loop")
     expect(page.get_by_label("Heading (degrees)")).to_have_value("90")
     page.get_by_label("x (mm)").fill("700")
