@@ -28,7 +28,7 @@ class Language:
         return self.catalogue.gettext(sentence) % parts
 
     def translate_sentence(self, sentence: str) -> str:
-        """Translate a sentence created elsewhere, including nested sentences. Other text stays as it is."""
+        """Translate a sentence created elsewhere, including nested sentences; its values remain. Other text stays."""
         if not isinstance(sentence, Sentence):
             return sentence
         template = self._translate_template(sentence.template) if sentence.template else ""
@@ -38,7 +38,7 @@ class Language:
             name: self.translate_sentence(part) if isinstance(part, Sentence) else part
             for name, part in sentence.values.items()
         }
-        return template % translated_parts
+        return Sentence(template, **translated_parts)
 
     def _translate_template(self, template: str) -> str:
         """Return the translated template. A clause (``make_clause``) may have only the translation of its sentence."""

@@ -54,13 +54,17 @@ def join_sentences(*sentences: str) -> str:
     return Sentence(_PAIR, first=first, second=join_sentences(*others)) if others else first
 
 
+def iterate_parts(sentence: str) -> Iterator[Sentence]:
+    """Yield a sentence and the sentences that are its values, from the outside in; nothing for plain text."""
+    if isinstance(sentence, Sentence):
+        yield sentence
+        for value in sentence.values.values():
+            yield from iterate_parts(value) if isinstance(value, Sentence) else ()
+
+
 def iterate_values(sentence: str) -> Iterator[tuple[str, object]]:
     """Yield the names and values of a sentence and of the sentences that are its values, from the outside in."""
-    if isinstance(sentence, Sentence):
-        yield from sentence.values.items()
-        for value in sentence.values.values():
-            if isinstance(value, Sentence):
-                yield from iterate_values(value)
+    return (item for part in iterate_parts(sentence) for item in part.values.items())
 
 
 def find_opening(sentence: str, template: str) -> Sentence | None:

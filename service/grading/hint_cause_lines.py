@@ -15,7 +15,7 @@ from service.grading.hint_motion import STOPPING_CRITERIA
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
 from service.grading.hint_tables import LIMITED_MOVES, PROPERTIES
 from service.grading.hint_texts import describe_quoting_line
-from service.grading.judging.message_parts import find_line, quote_text
+from service.grading.judging.message_parts import find_line
 from sim.sentences import Sentence, iterate_values, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.code import Functions
@@ -59,10 +59,12 @@ def _describe_cause_line(criterion: Criterion, message: str, clues: Clues) -> st
             for listing, each in collect_statements(clues)
             if any(call.name.rpartition(".")[2] in names for call in each.calls)
         ]
-        quotes = {value for _, value in iterate_values(message)}
-        texts = [text for text in (*clues.printed, *clues.spoken) if len(text) > 2 and quote_text(text) in quotes]
-        if len(locations) > 1 and texts:
-            locations = [describe_quoting_line(clues, "program", texts[-1])]
+        # A text may be quoted together with others.
+        quotes = [str(value) for _, value in iterate_values(message) if not isinstance(value, Sentence)]
+        texts = (text for text in (*clues.printed, *clues.spoken) if len(text) > 2)
+        quoted_texts = [text for text in texts if any(text in quote for quote in quotes)]
+        if len(locations) > 1 and quoted_texts:
+            locations = [describe_quoting_line(clues, "program", quoted_texts[-1])]
     elif isinstance(criterion, DRIVING_CRITERIA + STOPPING_CRITERIA):
         drive_statements = [
             (listing, each)

@@ -26,7 +26,7 @@ from service.reports.verdict_sentences import (
 )
 from sim.recording import Fault, Verdict
 from sim.recording_values import collect_faults
-from sim.sentences import iterate_values, join_sentences
+from sim.sentences import iterate_parts, iterate_values, join_sentences
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
 
 #: The names of the times in messages about a trial.
@@ -264,10 +264,18 @@ def describe_finding(grade: Grade, result: CriterionResult, language: Language =
     finding = to_display_text(failure.message, 600, lines=6)
     if failure.t is None:
         return finding
-    if not failure.t or any(name in _TIMES and value == failure.t for name, value in iterate_values(failure.message)):
+    if not failure.t or _states_time(failure.message, failure.t):
         return finding + _describe_scenario(grade, failure, language)
     timed_finding = language.say("%(found)s, at %(seconds)s s.", found=finding.rstrip("."), seconds=f"{failure.t:.2f}")
     return timed_finding + _describe_scenario(grade, failure, language)
+
+
+def _states_time(message: str, t: float) -> bool:
+    return any(
+        name in _TIMES and value == t and f"%({name})" in part.template
+        for part in iterate_parts(message)
+        for name, value in part.values.items()
+    )
 
 
 def _describe_confusions(accuracy: Accuracy, confusions: Sequence[tuple[str, str]], language: Language) -> str:
