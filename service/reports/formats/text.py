@@ -5,6 +5,7 @@ It contains everything in the view, for every reader.
 
 from __future__ import annotations
 
+import shutil
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,13 +41,13 @@ class _Block:
     indent: int = 0
     style: str = ""
 
-    def wrap(self) -> list[str]:
+    def wrap(self, width: int) -> list[str]:
         lines: list[str] = []
         for piece in self.text.split("\n"):
             first_indent = "" if not lines else " " * self.indent
             lines += textwrap.wrap(
                 piece,
-                _WIDTH,
+                width,
                 initial_indent=first_indent,
                 subsequent_indent=" " * self.indent,
                 break_on_hyphens=False,
@@ -57,7 +58,7 @@ class _Block:
 class _Line(_Block):
     """A line that is not wrapped."""
 
-    def wrap(self) -> list[str]:
+    def wrap(self, width: int) -> list[str]:
         return [self.text.rstrip()]
 
 
@@ -67,16 +68,17 @@ _BLANK = _Line("")
 @register_document("text", ".txt", build_staff_view)
 def render_plain_text(view: View, submission: Submission | None = None) -> str:
     """Return the grade in lines of at most 96 characters, without colour or control codes."""
-    return "\n".join(line for block in _build_blocks(view, submission) for line in block.wrap())
+    return "\n".join(line for block in _build_blocks(view, submission) for line in block.wrap(_WIDTH))
 
 
 @register_terminal("text", build_staff_view)
 def render_coloured_text(view: View, submission: Submission | None = None) -> Text:
-    """Return the same lines with colours. Text of students is never markup."""
+    """Return the same text with colours, in lines that fit the terminal. Text of students is never markup."""
     from rich.text import Text
 
+    width = min(_WIDTH, shutil.get_terminal_size().columns)
     blocks = _build_blocks(view, submission)
-    return Text("\n").join(Text("\n".join(block.wrap()), style=block.style) for block in blocks)
+    return Text("\n").join(Text("\n".join(block.wrap(width)), style=block.style) for block in blocks)
 
 
 def _build_blocks(view: View, submission: Submission | None) -> Iterator[_Block]:

@@ -226,13 +226,17 @@ def test_every_verdict_has_words(verdict: Verdict) -> None:
     assert ("not your fault" in words.explanation) is is_ours
 
 
-def test_a_terminal_shows_the_lines_of_the_text_in_colours() -> None:
+def test_a_terminal_shows_the_lines_of_the_text_in_colours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     for grade in (build.faulty_grade(), build.hostile_grade(), build.shape_grade()):
         view = build_staff_view(grade)
         coloured = render_coloured_text(view, build.faulty_submission())
         assert isinstance(coloured, Text)
         assert coloured.plain == render_plain_text(view, build.faulty_submission())
         assert {"bold", "red"} & {str(span.style) for span in coloured.spans}
+    monkeypatch.setenv("COLUMNS", "60")
+    lines = render_coloured_text(build_staff_view(build.faulty_grade())).plain.split("\n")
+    assert [len(line) <= 60 for line in lines if line.startswith("→")] == [True]
 
 
 def test_marks_are_not_rounded_on_the_way() -> None:
