@@ -26,6 +26,7 @@ from service.reports.html import render_report_page
 from service.reports.verdict_sentences import describe_verdict
 from service.reports.view import View, build_gradebook_view, build_staff_view, build_student_view, find_worst_trial
 from sim.recording import Verdict
+from submissions.submission import Submission
 
 pytestmark = pytest.mark.fast
 
@@ -226,16 +227,21 @@ def test_every_verdict_has_words(verdict: Verdict) -> None:
     assert ("not your fault" in words.explanation) is is_ours
 
 
+def _colour(view: View, submission: Submission | None = None) -> Text:
+    text = render_coloured_text(view, submission)
+    assert isinstance(text, Text)
+    return text
+
+
 def test_a_terminal_shows_the_lines_of_the_text_in_colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     for grade in (build.faulty_grade(), build.hostile_grade(), build.shape_grade()):
         view = build_staff_view(grade)
-        coloured = render_coloured_text(view, build.faulty_submission())
-        assert isinstance(coloured, Text)
+        coloured = _colour(view, build.faulty_submission())
         assert coloured.plain == render_plain_text(view, build.faulty_submission())
         assert {"bold", "red"} & {str(span.style) for span in coloured.spans}
     monkeypatch.setenv("COLUMNS", "60")
-    lines = render_coloured_text(build_staff_view(build.faulty_grade())).plain.split("\n")
+    lines = _colour(build_staff_view(build.faulty_grade())).plain.split("\n")
     assert [len(line) <= 60 for line in lines if line.startswith("→")] == [True]
 
 
