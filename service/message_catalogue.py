@@ -30,6 +30,7 @@ _ERROR_SOURCES = [
     for name in (
         "doctor",
         "playground",
+        "notebook_engine/checks",
         "operations/**",
         "store/batches/intake",
         "store/courses/open_assignments",
@@ -37,6 +38,7 @@ _ERROR_SOURCES = [
         "store/grades/comments",
         "store/grades/overrides",
         "store/people/lti",
+        "store/queue/notebook_runs",
         "store/queue/pool_progress",
         "store/queue/test_runs",
         "store/revision",
@@ -66,6 +68,7 @@ _ERROR_KEYWORDS = {
     "MissingPart": None,
     "MarksChanged": None,
     "AssignmentAlreadySeen": None,
+    "NotebookBusy": None,
 }
 _ERROR_KEYWORDS |= {"NotFound": None, "Forbidden": None, "Conflict": None, "Invalid": None, "UnknownPlatform": None}
 _OPTIONS = {

@@ -16,6 +16,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, or_, select
 from sqlalchemy.orm import Session
 
+from service.notebook_engine.stored_requests import list_stored_files
 from service.report_files import render_each_report
 from service.reports.formats.json_output import build_json_document
 from service.reports.view import View, build_student_view
@@ -24,6 +25,7 @@ from service.store.engine import Store
 from service.store.grades import current_grades, results
 from service.store.people import membership
 from service.store.queue.run_programs import split_program
+from service.store.queue.test_runs import NOTEBOOK_CHECKS, NOTEBOOK_RUNS
 from service.store.tables.courses import AssignmentVersion, Course, Extension
 from service.store.tables.grades import Appeal
 from service.store.tables.people import Credential, Enrolment, Person
@@ -136,13 +138,17 @@ def _load_test_runs(
     """Yield the data and the files of each stored test run, oldest first."""
     query = select(Tryout, AssignmentVersion.assignment, Tryout.packed, Tryout.replay)
     query = query.join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
-    query = query.where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment.not_in(without))
+    # A check can be of any assignment.
+    left_out = {*without, NOTEBOOK_CHECKS} if without else without
+    query = query.where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment.not_in(left_out))
     names = ("state", "queued_at", "finished_at", "words", "error")
     ordered = query.order_by(Tryout.queued_at, Tryout.id)
     for row, assignment, packed, replay in session.execute(ordered, execution_options={"yield_per": _CHUNK_SIZE}):
-        files = {"submission.zip": split_program(packed)[0]} if packed else {}
+        files = list_stored_files(split_program(packed)[0]) if packed else {}
         if replay:
-            files["replay.json"] = zlib.decompress(replay)
+            files["result.json" if assignment in (NOTEBOOK_RUNS, NOTEBOOK_CHECKS) else "replay.json"] = zlib.decompress(
+                replay
+            )
         yield {"assignment": assignment, **_read_columns(row, names)}, files
 
 

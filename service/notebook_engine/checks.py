@@ -12,6 +12,7 @@ from typing import Any
 
 from service.grading.grade import CriterionResult, Grade
 from service.grading.grader import ProgressObserver, grade
+from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.plotting import load_own_floors
 from service.reports.diagnosis import describe_finding, diagnose
@@ -84,7 +85,12 @@ def check_submission(
 ) -> dict[str, Any]:
     """Grade a submission in the visible part of an assignment, and return the check as data. Raises like ``grade``."""
     graded = grade(
-        submission, build_visible_assignment(assignment), secret=PUBLIC_SECRET, runner=runner, observe=observe
+        submission,
+        build_visible_assignment(assignment),
+        secret=PUBLIC_SECRET,
+        runner=runner,
+        observe=observe,
+        extent=PoolExtent.UNTIL_DECIDED,
     )
     if graded.verdict is Verdict.HOST_ERROR:
         raise HostError("a trial ended because of a machine fault")

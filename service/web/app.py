@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 
 from service.doctor import examine_service
 from service.language import translatable
+from service.operations import notebook_runs
 from service.operations.context import Service, Store
 from service.operations.database_errors import DatabaseError
 from service.queue.celery_app import make_celery
@@ -28,6 +29,7 @@ from service.web.access import check_same_site
 from service.web.api_description import build_openapi
 from service.web.compression import compress_response
 from service.web.context import WebContext
+from service.web.ended_runs import EndedRuns
 from service.web.errors import add_error_pages
 from service.web.metrics import render_metrics
 from service.web.rate_limits import RateLimit, RateLimits
@@ -51,7 +53,7 @@ def make_app(settings: Settings, store: Store) -> FastAPI:
     calls = settings.api_calls_per_minute
     limits = RateLimits(api_calls=RateLimit(round(calls), calls), page_calls=RateLimit(round(calls), calls))
     service = Service(settings, store, Notifier(make_celery(settings), store, settings))
-    app.state.context = WebContext(service, limits)
+    app.state.context = WebContext(service, limits, EndedRuns(partial(notebook_runs.find_ended, service)))
     app.add_middleware(BodyLimitMiddleware)
     app.add_middleware(SecurityMiddleware, public_url=settings.public_url, probe_hosts=settings.probe_hosts)
     add_error_pages(app)

@@ -15,6 +15,7 @@ from fastapi import Depends, Request
 from service.language import translatable
 from service.operations.context import Service
 from service.settings import Settings
+from service.web.ended_runs import EndedRuns
 from service.web.http_errors import TranslatableHTTPException
 from service.web.rate_limits import RateLimits
 from sim.sentences import Sentence
@@ -48,6 +49,7 @@ class WebContext:
 
     service: Service
     limits: RateLimits
+    ended_runs: EndedRuns
     #: Held while a batch is unpacked, so that only one is unpacked at a time.
     unpacking: BoundedSemaphore = field(default_factory=BoundedSemaphore)
     #: Held while files of a student are read.

@@ -61,6 +61,8 @@ class RateLimits:
     submissions: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
     #: Test runs of one person. The store limits the total number.
     test_runs: RateLimit = field(default_factory=lambda: RateLimit(burst=10, per_minute=6))
+    #: Runs of one person's notebook; each answer of a responder is one. The store limits the total number.
+    notebook_runs: RateLimit = field(default_factory=lambda: RateLimit(burst=120, per_minute=120))
     #: Downloads of all own data, by person. One can have hundreds of megabytes.
     exports: RateLimit = field(default_factory=lambda: RateLimit(burst=3, per_minute=0.1))
     #: Downloads of the files of an own submission, by person. Readers that are slow keep them in memory.

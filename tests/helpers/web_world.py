@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 
 import report_builders
 from builders import echo, grading_request, prepared
+from service.notebook_engine.stored_requests import build_owner
 from service.pending_uploads import PendingUploads
 from service.store.batches import intake
 from service.store.courses import open_assignments
@@ -17,7 +18,7 @@ from service.store.courses.assignment_versions import freeze_assignment
 from service.store.grades import appeals
 from service.store.people import credentials, webhooks
 from service.store.people.membership import Member
-from service.store.queue import jobs, test_runs
+from service.store.queue import jobs, notebook_runs, test_runs
 from service.store.states import CredentialKind
 from service.web.rendering import build_static_paths
 from submissions.raw_files import UploadedFile
@@ -74,6 +75,7 @@ def make_world(web: Web) -> World:
         "comment_id": "1",
         "appeal_id": str(appeal),
         "tryout_id": _tryout(web, ada),
+        "run_id": _notebook_run(web, ada),
     }
     return World(ada, grace, values)
 
@@ -90,6 +92,17 @@ def _tryout(web: Web, member: Member) -> str:
     more = {"lines": [], "more_lines": 0, "faults": [], "failed": "", "notes": []}
     test_runs.finish_test_run(web.store, claimed, result | more, zlib.compress(b"{}"))
     return test_run
+
+
+def _notebook_run(web: Web, member: Member) -> str:
+    """Create a run of a notebook that has a result."""
+    owner = freeze_assignment(build_owner(test_runs.NOTEBOOK_RUNS))
+    with web.store.transaction() as session:
+        run_id = notebook_runs.queue_notebook_run(session, member.enrolment_id, owner, b"")
+    claimed = test_runs.claim_test_run(web.store, 60)
+    assert claimed is not None
+    test_runs.finish_test_run(web.store, claimed, {}, zlib.compress(b"{}"))
+    return run_id
 
 
 def create_upload(web: Web, member: Member) -> str:

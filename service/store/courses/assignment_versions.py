@@ -65,6 +65,12 @@ def store_version(session: Session, frozen_assignment: FrozenAssignment, current
     return session.scalars(version_query).one()
 
 
+def load_version(session: Session, version_id: int) -> Assignment | None:
+    """Return the assignment in a row; None if the row was deleted."""
+    content = session.scalar(select(AssignmentVersion.content).where(AssignmentVersion.id == version_id))
+    return None if content is None else assignment_from_bytes(content)
+
+
 def check_assignment(session: Session, name: str) -> None:
     """Raise UsageError, with a similar name, if an assignment is neither in the catalogue nor stored.
 

@@ -1,6 +1,7 @@
 """Test runs: student programs that run without being submitted. Limits, claims and results.
 
-They have a separate queue, leave no marks and are deleted after a day. ``service.test_runs`` runs them.
+They have a separate queue, leave no marks and are deleted after a day. ``service.test_runs`` runs them. Notebooks share
+the queue, with limits of their own (``notebook_runs.py``).
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ MAX_TEST_RUNS_PER_HOUR = 30
 #: The first death of a worker is retried; a second one is attributed to the program.
 MAX_ATTEMPTS = 2
 _RETENTION = timedelta(days=1)
+#: Ids of the built-in assignments to which runs and checks of notebooks belong. No assignment file can have them.
+NOTEBOOK_RUNS, NOTEBOOK_CHECKS = "%notebook-run", "%notebook-check"
 _SILENT_WORKER = "The worker stopped responding twice. An operator can find details in the log of the worker."
 _UNFINISHED = (RunState.QUEUED.value, RunState.RUNNING.value)
 
@@ -71,28 +74,53 @@ def queue_test_run(session: Session, enrolment_id: int, version_id: int, packed_
 
     Raises UsageError if the student has an unfinished one, or too many within an hour.
     """
-    # Serialises concurrent requests, so that the second one finds the first.
-    session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
-    current_time = now(session)
-    is_by_student = Tryout.enrolment_id == enrolment_id
-    session.execute(
-        delete(Tryout).where(Tryout.queued_at < current_time - _RETENTION, Tryout.state.not_in(_UNFINISHED))
-    )
-    if session.scalar(select(func.count()).where(is_by_student, Tryout.state.in_(_UNFINISHED))):
+    current_time = begin_queueing(session, enrolment_id)
+    is_by_student = and_(Tryout.enrolment_id == enrolment_id, ~match_assignments(NOTEBOOK_RUNS, NOTEBOOK_CHECKS))
+    if has_unfinished(session, is_by_student):
         raise UsageError("your previous test run is not completed yet; wait for it before you start another one.")
-    if (
-        session.scalar(select(func.count()).where(is_by_student, Tryout.queued_at > current_time - timedelta(hours=1)))
-        or 0
-    ) >= (MAX_TEST_RUNS_PER_HOUR):
+    if count_within_hour(session, is_by_student, current_time) >= MAX_TEST_RUNS_PER_HOUR:
         raise UsageError(
             "%(count)s test runs within an hour is the limit; wait a few minutes, or submit your files.",
             count=MAX_TEST_RUNS_PER_HOUR,
         )
     _delete_programs(session, enrolment_id, version_id)
+    return insert_queued(session, enrolment_id, version_id, packed_submission, current_time)
+
+
+def begin_queueing(session: Session, enrolment_id: int) -> datetime:
+    """Let concurrent requests of a student wait for each other, delete expired runs, and return the current time."""
+    # The second request then finds the run of the first.
+    session.execute(select(Enrolment.id).where(Enrolment.id == enrolment_id).with_for_update(key_share=True)).all()
+    current_time = now(session)
+    session.execute(
+        delete(Tryout).where(Tryout.queued_at < current_time - _RETENTION, Tryout.state.not_in(_UNFINISHED))
+    )
+    return current_time
+
+
+def match_assignments(*assignments: str) -> ColumnElement[bool]:
+    """Return the condition on a ``Tryout`` that it is of one of these assignments."""
+    versions = select(AssignmentVersion.id).where(AssignmentVersion.assignment.in_(assignments))
+    return Tryout.assignment_version_id.in_(versions)
+
+
+def has_unfinished(session: Session, condition: ColumnElement[bool]) -> bool:
+    """Return whether one of the runs is queued or running."""
+    return bool(session.scalar(select(func.count()).where(condition, Tryout.state.in_(_UNFINISHED))))
+
+
+def count_within_hour(session: Session, condition: ColumnElement[bool], current_time: datetime) -> int:
+    """Return how many of the runs were queued within the last hour."""
+    is_recent = Tryout.queued_at > current_time - timedelta(hours=1)
+    return session.scalar(select(func.count()).where(condition, is_recent)) or 0
+
+
+def insert_queued(session: Session, enrolment_id: int, version_id: int, packed: bytes, current_time: datetime) -> str:
+    """Insert a queued run and return its id."""
     row = Tryout(
         enrolment_id=enrolment_id,
         assignment_version_id=version_id,
-        packed=packed_submission,
+        packed=packed,
         state=RunState.QUEUED.value,
         queued_at=current_time,
     )
@@ -208,23 +236,32 @@ def find_student_run(session: Session, enrolment_id: int, tryout_id: str) -> Stu
     query = (
         select(Tryout, AssignmentVersion.assignment, AssignmentVersion.title)
         .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
-        .where(Tryout.id == tryout_id, Tryout.enrolment_id == enrolment_id)
+        .where(
+            Tryout.id == tryout_id,
+            Tryout.enrolment_id == enrolment_id,
+            AssignmentVersion.assignment.not_in([NOTEBOOK_RUNS, NOTEBOOK_CHECKS]),
+        )
     )
     run_row = session.execute(query).one_or_none()
     if run_row is None:
         return None
     row, assignment, title = run_row
-    is_earlier = (Tryout.state == RunState.QUEUED.value, Tryout.queued_at < row.queued_at)
     return StudentTestRun(
         row.id,
         assignment,
         title,
         RunState(row.state),
         row.queued_at,
-        session.scalar(select(func.count()).where(*is_earlier)) or 0,
+        count_earlier(session, row.queued_at),
         row.words or {},
         row.error or "",
     )
+
+
+def count_earlier(session: Session, queued_at: datetime) -> int:
+    """Return how many runs are ahead in the queue of one that was queued at this time."""
+    is_earlier = (Tryout.state == RunState.QUEUED.value, Tryout.queued_at < queued_at)
+    return session.scalar(select(func.count()).where(*is_earlier)) or 0
 
 
 def load_replay(session: Session, tryout_id: str) -> bytes | None:

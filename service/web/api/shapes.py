@@ -190,6 +190,8 @@ class GradeShape(Shape):
     marks: float
     max_marks: float
     verdict: str
+    cause: str = Field(description="The main reason for lost marks, in a sentence.", default="")
+    next_step: str = Field(description="What to do next, in a sentence.", default="")
     hints: list[str] = []
     criteria: list[CriterionShape]
     trials: list[TrialShape]
@@ -210,6 +212,8 @@ class GradeShape(Shape):
                     "marks": 10,
                     "max_marks": 12,
                     "verdict": "finished",
+                    "cause": "In trial 2, the shape was identified as another one.",
+                    "next_step": "Compare the images of both shapes.",
                     "criteria": [
                         {
                             "id": "named",

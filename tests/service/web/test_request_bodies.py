@@ -29,6 +29,7 @@ _UNSAFE = [route for route in ROUTES if route.split()[0] not in ("GET", "HEAD")]
 #: The length limit of an upload, for routes that declare one.
 _UPLOADS = {
     "POST /api/v1/courses/{course_id}/assignments/uploads": 130,
+    "POST /api/v1/courses/{course_id}/mine/notebook-runs/checks": 34,
     "POST /api/v1/courses/{course_id}/mine/submissions": 34,
     "POST /api/v1/courses/{course_id}/mine/tryouts": 34,
     "POST /api/v1/courses/{course_id}/playground": 34,
