@@ -66,6 +66,47 @@ def read_check(data: Mapping[str, Any]) -> Check:
         raise _build_error(error) from None
 
 
+def read_grade(title: str, grade: Mapping[str, Any], replay: Mapping[str, Any]) -> Check:
+    """Return the report of a graded submission, from a server's data. Raises EngineError if the data are not one."""
+    try:
+        moments = _list_moments(replay)
+        return Check(
+            title=title,
+            happened=grade["cause"],
+            marks=_format_marks(grade["marks"]),
+            out_of=_format_marks(grade["max_marks"]),
+            criteria=tuple(
+                CheckedCriterion(
+                    each["title"],
+                    each["message"],
+                    _format_marks(each["marks"]),
+                    _format_marks(each["max_marks"]),
+                    each["marks"] >= each["max_marks"],
+                    moments.get(each["title"]),
+                )
+                for each in grade["criteria"]
+            ),
+            next_steps=tuple(each for each in (grade["next_step"],) if each),
+            notes=(*grade["notes"], *(str(each["text"]) for each in grade["comments"])),
+            replay=replay,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise _build_error(error) from None
+
+
+def _list_moments(replay: Mapping[str, Any]) -> dict[str, tuple[int, float]]:
+    """Return the first lost moment of each criterion, by title: the trial in the replay, and the second."""
+    moments: dict[str, tuple[int, float]] = {}
+    for number, trial in enumerate(replay["trials"]):
+        for lost in trial["lost"]:
+            moments.setdefault(lost["title"], (number, float(lost["t"])))
+    return moments
+
+
+def _format_marks(marks: float) -> str:
+    return f"{marks:.2f}".rstrip("0").rstrip(".")
+
+
 def _read_run(data: Mapping[str, Any]) -> RobotRun:
     return RobotRun(
         sha256=data["sha256"],
