@@ -7,9 +7,10 @@ from html import escape
 
 from robomark_notebook.engine import RobotRun, RunFault
 
-#: The most lines of one run that are shown. The replay has all of them.
-_MAX_LINES = 200
+#: The most lines of one run that are shown, from its start and before its end. The replay has all of them.
+_FIRST_LINES, _LAST_LINES = 60, 40
 _MAX_LENGTH = 600
+_LINES = "max-height: 20em; overflow: auto"
 _ERROR = "border-left: 4px solid #c43145; padding-left: 0.8em; margin: 0.4em 0"
 _NOTE = "opacity: 0.75; margin: 0.3em 0"
 
@@ -21,17 +22,13 @@ def summarize_run(run: RobotRun) -> str:
 
 def format_run(run: RobotRun, notes: Sequence[str], faults: Sequence[RunFault]) -> str:
     """Return what was printed, said and sent, then the faults and notes, as text."""
-    shown, left_out = _select_lines(run)
-    lines = [f"{seconds:7.2f} s  {text}" for seconds, text in shown]
-    return "\n".join([*lines, *left_out, *map(_describe_fault, faults), *format_notes(notes)])
+    return "\n".join([*_format_lines(run), *map(_describe_fault, faults), *format_notes(notes)])
 
 
 def format_run_as_html(run: RobotRun, notes: Sequence[str], faults: Sequence[RunFault]) -> str:
     """Return the same as HTML."""
-    shown, left_out = _select_lines(run)
-    printed = "\n".join(f"{seconds:7.2f} s  {escape(text)}" for seconds, text in shown)
-    parts = [f"<pre>{printed}</pre>"] if shown else []
-    parts += [_to_paragraph(text, _NOTE) for text in left_out]
+    lines = escape("\n".join(_format_lines(run)))
+    parts = [f'<pre style="{_LINES}">{lines}</pre>'] if lines else []
     parts += [_to_paragraph(_describe_fault(fault), _ERROR) for fault in faults]
     parts += [_to_paragraph(text, _NOTE) for text in format_notes(notes)]
     return "".join(parts)
@@ -47,11 +44,17 @@ def format_notes_as_html(notes: Iterable[str]) -> str:
     return "".join(_to_paragraph(note, _NOTE) for note in format_notes(notes))
 
 
-def _select_lines(run: RobotRun) -> tuple[list[tuple[float, str]], list[str]]:
-    """Return the lines that are shown, and a sentence on the others if there are any."""
-    shown = [(seconds, text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]} …") for seconds, text in run.lines]
-    more = len(shown) - _MAX_LINES
-    return shown[:_MAX_LINES], [f"… {more} more lines are in the replay"] if more > 0 else []
+def _format_lines(run: RobotRun) -> list[str]:
+    """Return the lines with their times. Long texts are cut, and of many lines some in the middle are left out."""
+    lines = [f"{seconds:7.2f} s  {_shorten(text)}" for seconds, text in run.lines]
+    left_out = len(lines) - _FIRST_LINES - _LAST_LINES
+    if left_out <= 0:
+        return lines
+    return [*lines[:_FIRST_LINES], f"… {left_out} more lines, which are in the replay …", *lines[-_LAST_LINES:]]
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]} …"
 
 
 def _describe_fault(fault: RunFault) -> str:

@@ -12,16 +12,17 @@ async function render({ model, el }) {
     const bytes = model.get("replay");
     const controls = bytes.byteLength ? await showReplay(await unpack(bytes), root) : null;
     section.hidden = !controls;
-    if (controls) followLinks(frame, controls);
+    if (controls) adaptToOutput(frame, controls);
     frame.dataset.ready = "true";
   } catch (error) {
     root.replaceChildren(element("p", {}, say("cannotBeShown", { error: error.message })));
   }
 }
 
-// Links to moments move the replay of this output, and not the page.
-function followLinks(frame, controls) {
+// Links to moments move the replay of this output, and not the page. An output has little room.
+function adaptToOutput(frame, controls) {
   controls.link.hidden = true;
+  frame.querySelector(".all-readings").open = false;
   for (const button of frame.querySelectorAll("button.watch")) button.hidden = false;
   frame.addEventListener("click", (event) => {
     const link = event.target.closest("a[href^='#'], button.watch");
