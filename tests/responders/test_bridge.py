@@ -122,6 +122,7 @@ def test_the_line_of_a_responders_error_is_its_own(runner: TrialRunner) -> None:
         ("def responder(m): return 'a'\ndef other_responder(m): return 'b'", "a"),
         ("def only_responder(m): return 'c'", "c"),
         ("def a_responder(m): return 'a'\ndef b_responder(m): return 'b'\nroboSim.pyresponder = b_responder", "b"),
+        ("def responder(m): roboSim.set_element('response', 'a')", "a"),
         ("def answer_responder(m): return msg", "PY::?"),
         ("msg = 'mine'\ndef answer_responder(m): return msg", "mine"),
     ],

@@ -107,6 +107,7 @@ def test_what_cannot_be_done_is_told_and_the_rest_goes_on(
     "cell",
     [
         "%load_ext nbev3devsim\n%matplotlib inline\nroboSim?",
+        "%load_ext robomark_notebook\n%robomark check stop-at-line",
         "import matplotlib.pyplot as plt\nfigure, axes = plt.subplots()\nplt.plot([1, 2]);\naxes.hist([1])",
         "from tqdm import trange\nassert sum(trange(4)) == 6\nfrom IPython.display import display, Image\ndisplay(1)",
         "import pandas as pd\npd.DataFrame({'a': [1, 2]}).plot(x='a')",
