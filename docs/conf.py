@@ -18,7 +18,7 @@ _ROOT = Path(__file__).parent.parent
 #: The pages in the sidebar. They are not in the Markdown files, where GitHub would show them as code.
 SIDEBAR = {
     "Start": ["docs/tutorial", "docs/marks", "docs/statements"],
-    "Students": ["docs/students", "docs/replay"],
+    "Students": ["docs/students", "docs/notebook", "docs/replay"],
     "Instructors": ["docs/web", "docs/instructors", "docs/criteria", "docs/models", "docs/recognition"],
     "Operators": ["docs/operators", "docs/performance", "docs/threat-model", "docs/sandbox", "SECURITY"],
     "Programmers": [
