@@ -24,9 +24,10 @@ class Session:
         self._token = os.environ.get(TOKEN_VARIABLE, "")
         self._page: Page | None = None
         self._engine: Engine | None = None
-        # It starts ahead, so that the first robot does not wait for it. Whoever uses it learns what is wrong.
-        with contextlib.suppress(EngineError):
-            self._engine = self._create_engine()
+        if not self.url:
+            # It starts ahead, so that the first robot does not wait for it. Whoever uses it learns what is wrong.
+            with contextlib.suppress(EngineError):
+                self._engine = create_local_engine()
 
     @property
     def engine(self) -> Engine:
@@ -36,7 +37,7 @@ class Session:
             EngineError: It cannot be started.
         """
         if self._engine is None:
-            self._engine = self._create_engine()
+            self._engine = _create_engine(self.url, self._token)
         self._engine.seed = self.seed
         return self._engine
 
@@ -44,7 +45,7 @@ class Session:
         """Use a server from now on, with a new simulator.
 
         Raises:
-            EngineError: The address or the token is invalid.
+            EngineError: The server cannot be used. The session stays as it was.
         """
         if not token.strip():
             raise EngineError("The token is empty. Create one on the server, on the page of your account.")
@@ -54,7 +55,7 @@ class Session:
         """Use the command ``robomark`` on this machine from now on, with a new simulator.
 
         Raises:
-            EngineError: There is no such command.
+            EngineError: There is no such command. The session stays as it was.
         """
         self._change_engine("", "")
 
@@ -75,12 +76,9 @@ class Session:
             engine.close()
 
     def _change_engine(self, url: str, token: str) -> None:
+        engine = _create_engine(url, token)
         self.close()
-        self.url, self._token = url, token
-        self._engine = self._create_engine()
-
-    def _create_engine(self) -> Engine:
-        return create_server_engine(self.url, self._token) if self.url else create_local_engine()
+        self.url, self._token, self._engine = url, token, engine
 
 
 def check_address(url: str) -> str:
@@ -93,6 +91,10 @@ def check_address(url: str) -> str:
     if address.scheme not in ("http", "https") or not address.netloc:
         raise EngineError(f"{url[:80]} is not the address of a server. Expected one such as https://robomark.example.")
     return url.rstrip("/")
+
+
+def _create_engine(url: str, token: str) -> Engine:
+    return create_server_engine(url, token) if url else create_local_engine()
 
 
 # Only the chosen engine's module is imported: the server's takes a while.

@@ -6,8 +6,10 @@ import re
 
 import pytest
 
+from fake_engine import FakeEngine
 from notebook_shell import NotebookShell
-from robomark_notebook.engine import MagicCall
+from robomark_notebook import session
+from robomark_notebook.engine import Engine, EngineError, MagicCall
 
 pytestmark = pytest.mark.fast
 
@@ -165,6 +167,36 @@ def test_the_token_is_asked_for_and_stays_out_of_the_notebook(
     assert asked == ["Token for https://robomark.example: "]
     assert "Robots run on https://robomark.example." in shown
     assert "rm_secret" not in shown + repr(notebook.shell.user_ns)
+
+
+def test_a_connection_that_fails_leaves_the_session_as_it_was(
+    notebook: NotebookShell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_url: str, _token: str) -> Engine:
+        raise EngineError("The server does not accept this token.")
+
+    monkeypatch.setattr(session, "create_server_engine", refuse)
+    monkeypatch.setattr("getpass.getpass", lambda _prompt: "rm_secret")
+    assert "does not accept this token" in notebook.run("%robomark connect https://x.example").stderr
+    assert "Robots run on this machine." in notebook.text("%robomark")
+    notebook.run("%sim_magic -b Loop")
+    assert len(notebook.engine.calls) == 1
+
+
+def test_a_hub_connects_when_a_robot_runs(notebook: NotebookShell, monkeypatch: pytest.MonkeyPatch) -> None:
+    connected: list[tuple[str, str]] = []
+
+    def connect(url: str, token: str) -> Engine:
+        connected.append((url, token))
+        return FakeEngine()
+
+    monkeypatch.setattr(session, "create_server_engine", connect)
+    monkeypatch.setenv("ROBOMARK_TOKEN", "rm_secret")
+    monkeypatch.setenv("ROBOMARK_URL", "https://hub.example")
+    made = session.Session()
+    assert (made.url, connected) == ("https://hub.example", []), "a server that is down does not stop the extension"
+    made.call_magic(MagicCall(1, "sim_magic", "-b Loop", None), lambda _question: None)
+    assert connected == [("https://hub.example", "rm_secret")]
 
 
 def test_the_token_comes_from_the_environment(notebook: NotebookShell, monkeypatch: pytest.MonkeyPatch) -> None:
