@@ -150,7 +150,10 @@ class ServerEngine:
         reason = state["refused"] or (state["error"] if state["state"] != "done" else "")
         if reason:
             raise EngineError(f"{reason[:1].upper()}{reason[1:]}")
-        return self._get(f"{runs}/{state['id']}/result")
+        if not isinstance(state.get("result"), dict):
+            raise EngineError("The result is no longer on the server. Run the cell again.")
+        result: dict[str, Any] = state["result"]
+        return result
 
     def _read_submission(self, document: Mapping[str, Any]) -> Submitted:
         place = document.get("place")

@@ -7,8 +7,7 @@ Results are stored for a day.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-
-from sqlalchemy.orm import Session
+from dataclasses import dataclass
 
 from service.notebook_engine.checks import build_visible_assignment
 from service.notebook_engine.requests import MagicRequest
@@ -26,6 +25,14 @@ from service.store.states import Role
 from submissions.raw_files import UploadedFile
 
 __all__ = ["StudentNotebookRun"]
+
+
+@dataclass(frozen=True, slots=True)
+class NotebookRunWithResult:
+    """A run or check of a notebook, and its compressed JSON result; None if there is none, or no longer."""
+
+    run: StudentNotebookRun
+    result: bytes | None
 
 
 def start_run(
@@ -56,19 +63,14 @@ def start_check(
     return _queue(service, target.enrolment_id, NOTEBOOK_CHECKS, packed)
 
 
-def show(service: Service, actor: Actor, course_id: int, run_id: str) -> StudentNotebookRun:
-    """Return the state of one of the actor's runs or checks. Raises NotFound."""
+def show(service: Service, actor: Actor, course_id: int, run_id: str) -> NotebookRunWithResult:
+    """Return one of the actor's runs or checks. Raises NotFound."""
     with service.store.reading() as session:
-        return _require_run(session, actor, course_id, run_id)
-
-
-def show_result(service: Service, actor: Actor, course_id: int, run_id: str) -> bytes:
-    """Return the compressed result of one of the actor's runs or checks. Raises NotFound, also without a result."""
-    with service.store.reading() as session:
-        result = queue.load_replay(session, _require_run(session, actor, course_id, run_id).id)
-    if result is None:
-        raise _build_not_found()
-    return result
+        enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
+        run = notebook_runs.find_student_run(session, enrolment_id, run_id)
+        if run is None:
+            raise NotFound("There is no such page or item, or you have no access to it.")
+        return NotebookRunWithResult(run, None if run.waits else queue.load_replay(session, run.id))
 
 
 def find_ended(service: Service, run_ids: Collection[str]) -> list[str]:
@@ -88,15 +90,3 @@ def _queue(service: Service, enrolment_id: int, kind: str, packed: bytes) -> Stu
     assert run is not None
     service.notifier.notify_test_runs()
     return run
-
-
-def _require_run(session: Session, actor: Actor, course_id: int, run_id: str) -> StudentNotebookRun:
-    enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-    run = notebook_runs.find_student_run(session, enrolment_id, run_id)
-    if run is None:
-        raise _build_not_found()
-    return run
-
-
-def _build_not_found() -> NotFound:
-    return NotFound("There is no such page or item, or you have no access to it.")

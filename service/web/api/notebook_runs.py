@@ -7,7 +7,7 @@ answer, and the run repeats exactly to the next question.
 from __future__ import annotations
 
 import zlib
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import Depends, Query, Request
 from fastapi.concurrency import run_in_threadpool
@@ -16,12 +16,14 @@ from pydantic import Field
 
 from service.notebook_engine.requests import MagicRequest
 from service.operations import notebook_runs
+from service.operations.notebook_runs import NotebookRunWithResult
 from service.operations.types import Role, RunState
 from service.web.access import RowName
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
-from service.web.api_routes import ResponseDescriptions, api_router, respond_with_etag
+from service.web.api_routes import api_router
 from service.web.api_uploads import MAX_SUBMISSION_BYTES, SENT_BODY, SentFiles
+from service.web.compression import compress_response
 from service.web.context import UPLOAD_IN_PROGRESS, Context, hold_slot
 from service.web.request_bodies import takes_upload
 
@@ -30,13 +32,6 @@ SubmitAccess = Annotated[CallerInCourse, Depends(require_role(Role.STUDENT, "sub
 PREFIX = "/courses/{course_id}/mine/notebook-runs"
 _MAX_ANSWERS = 200
 _MAX_WAIT_SECONDS = 20.0
-_RESULT_RESPONSES: ResponseDescriptions = {
-    200: {
-        "content": {"application/json": {"schema": {"type": "object"}}},
-        "description": "Of a run: `question` with `number`, `t`, `text`, `data`, `images`; or `page`, `notes` and "
-        "`run`. Of a check: `title`, `happened`, `marks`, `out_of`, `criteria`, `next_steps`, `notes`, `replay`.",
-    }
-}
 
 
 class NotebookRunRequest(MagicRequest):
@@ -56,8 +51,16 @@ class NotebookRunShape(Shape):
     before: int = Field(description="Number of runs ahead in the queue.")
     refused: str = Field(description="Reason for rejecting the request; empty if it was not rejected.")
     error: str = Field(description="Reason for a failure of the system; empty if there is none.")
+    result: dict[str, Any] | None = Field(
+        description="Result of a run: `question` with `number`, `t`, `text`, `data`, `images`; or `page`, `notes` and "
+        "`run`. Of a check: `title`, `happened`, `marks`, `out_of`, `criteria`, `next_steps`, `notes`, `replay`. Null "
+        "until then.",
+        default=None,
+    )
 
-    model_config = build_example_config(id="7xk2v9q4m0ab", kind="run", state="done", before=0, refused="", error="")
+    model_config = build_example_config(
+        id="7xk2v9q4m0ab", kind="run", state="done", before=0, refused="", error="", result=None
+    )
 
 
 @router.post(PREFIX, status_code=201)
@@ -90,24 +93,27 @@ def check(
     return NotebookRunShape.model_validate(started)
 
 
-@router.get(PREFIX + "/{run_id}")
+@router.get(PREFIX + "/{run_id}", response_model=NotebookRunShape)
 async def one_run(
+    request: Request,
     access: SubmitAccess,
     context: Context,
     run_id: RowName,
     wait: Annotated[float, Query(ge=0, le=_MAX_WAIT_SECONDS, description="Seconds to wait for the end.")] = 0.0,
-) -> NotebookRunShape:
-    """Return the state of a run or check. With `wait`, the response comes when it has ended, or after this time."""
+) -> Response:
+    """Return a run or check with its result. With `wait`, the response comes at its end, or after this time."""
     parts = (context.service, access.actor, access.course_id, run_id)
     found = await run_in_threadpool(notebook_runs.show, *parts)
-    if found.waits and wait:
+    if found.run.waits and wait:
         await context.ended_runs.wait(run_id, wait)
         found = await run_in_threadpool(notebook_runs.show, *parts)
-    return NotebookRunShape.model_validate(found)
+    return await run_in_threadpool(_respond, request, found)
 
 
-@router.get(PREFIX + "/{run_id}/result", responses=_RESULT_RESPONSES, response_class=Response)
-def result(request: Request, access: SubmitAccess, context: Context, run_id: RowName) -> Response:
-    """Return the result of a run or check; 404 until it is available. Results are deleted after a day."""
-    compressed = notebook_runs.show_result(context.service, access.actor, access.course_id, run_id)
-    return respond_with_etag(request, zlib.decompress(compressed), "application/json")
+def _respond(request: Request, found: NotebookRunWithResult) -> Response:
+    """Return the state with the stored JSON of the result, which is not parsed again."""
+    state = NotebookRunShape.model_validate(found.run).model_dump_json(exclude={"result"}).encode()
+    result = b"null" if found.result is None else zlib.decompress(found.result)
+    return compress_response(
+        request, Response(b'%s,"result":%s}' % (state[:-1], result), media_type="application/json")
+    )

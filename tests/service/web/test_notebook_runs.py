@@ -71,7 +71,7 @@ class Notebook:
         self.work()
         state = self.get(started.json()["id"]).json()
         assert (state["state"], state["refused"], state["error"]) == ("done", "", ""), state
-        result: dict[str, Any] = self.get(f"{started.json()['id']}/result").json()
+        result: dict[str, Any] = state["result"]
         return result
 
 
@@ -140,7 +140,7 @@ def test_a_student_has_one_at_a_time_and_a_repeated_request_is_the_same(notebook
     assert again.json()["id"] == started.json()["id"]
     busy = notebook.post(json=REQUEST)
     assert (busy.status_code, "not completed yet" in busy.json()["detail"]) == (409, True)
-    assert notebook.get(f"{started.json()['id']}/result").status_code == 404
+    assert notebook.get(started.json()["id"]).json()["result"] is None
 
 
 def test_a_wait_ends_when_the_run_has_ended(notebook: Notebook) -> None:
@@ -159,9 +159,8 @@ def test_nobody_else_sees_a_run(notebook: Notebook) -> None:
     run_id = notebook.post(json=REQUEST).json()["id"]
     notebook.work()
     bob = notebook.web.token(notebook.web.student("bob"), "submit", "read")
-    for path in (run_id, f"{run_id}/result"):
-        assert notebook.get(path).status_code == 200
-        assert notebook.client.get(f"{RUNS}/{path}", headers=bob).status_code == 404
+    assert notebook.get(run_id).json()["result"]
+    assert notebook.client.get(f"{RUNS}/{run_id}", headers=bob).status_code == 404
     grace = notebook.web.token(notebook.web.instructor("grace"), "submit", "read")
     assert notebook.client.post(RUNS, json=REQUEST, headers=grace).status_code == 404
 
@@ -180,7 +179,7 @@ def test_a_notebook_is_checked_without_an_attempt(notebook: Notebook) -> None:
     started = _check(notebook, cells)
     assert (started.status_code, started.json()["kind"]) == (201, "check"), started.text
     notebook.work()
-    check = notebook.get(f"{started.json()['id']}/result").json()
+    check = notebook.get(started.json()["id"]).json()["result"]
     assert (check["marks"], all(each["passed"] for each in check["criteria"])) == (check["out_of"], True)
     reading = notebook.web.token(notebook.web.student("ada"), "read")
     assert notebook.client.get("/api/v1/courses/1/mine/submissions", headers=reading).json()["items"] == []
