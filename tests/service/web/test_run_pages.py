@@ -99,9 +99,7 @@ def test_without_javascript_a_run_is_waited_for_and_its_program_stays(web: Web, 
 
 
 @pytest.mark.parametrize("path", [TRY, PLAYGROUND])
-def test_htmx_asks_less_often_far_back_in_the_queue(
-    web: Web, ada: Member, path: str
-) -> None:
+def test_htmx_asks_less_often_far_back_in_the_queue(web: Web, ada: Member, path: str) -> None:
     browser = web.browser(ada)
     assert browser.get(path, headers=PART).headers["hx-refresh"] == "true"
     begun = _run(browser, path, headers=PART)
