@@ -110,7 +110,7 @@ def _photograph_student(browser: Browser, link: str, work: Path, folder: Path) -
     page.goto(f"{address}/courses/1/mine/{_ASSIGNMENT}/try")
     page.get_by_role("textbox", name="robot.py").click()
     page.keyboard.press("Control+End")
-    page.keyboard.type("print(mesages)\n")
+    page.keyboard.type("print(messages)\n")
     page.get_by_role("button", name="Run", exact=True).click()
     page.wait_for_selector("section.replay[data-ready]")
     page.locator(".cm-message").wait_for()

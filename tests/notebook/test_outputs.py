@@ -113,7 +113,7 @@ def test_long_outputs_are_cut() -> None:
     text = texts.format_run(run, [], [])
     assert text.count("\n") == 100
     assert "… 400 more lines, which are in the replay …" in text
-    assert text.rstrip("y …").endswith("4.99 s ")
+    assert text.rstrip("y …").endswith("4.99 s")
     assert len(text) < 65_000
 
 
@@ -145,7 +145,7 @@ def test_the_texts_of_the_replay_are_those_of_the_reports(package: Any) -> None:
 
 
 def test_the_widget_has_the_component_of_the_reports() -> None:
-    shared = load_report_script().split("// Starts the replay of a report's page.")[0].partition('"use strict";\n')[2]
+    shared = load_report_script().split("// Starts the replays of a page")[0].partition('"use strict";\n')[2]
     assert len(shared) > 30_000
     assert shared.strip() in str(ReplayWidget._esm)
 
