@@ -29,9 +29,9 @@ def build_wheel(folder: Path) -> Path:
 
 
 def unpack_package(folder: Path) -> Path:
-    """Build the wheel, unpack it in a folder, and return that."""
+    """Build the wheel, unpack its packages in a folder, and return that. As a distribution it stays unknown there."""
     with zipfile.ZipFile(build_wheel(folder)) as wheel:
-        wheel.extractall(folder)
+        wheel.extractall(folder, [name for name in wheel.namelist() if ".dist-info/" not in name])
     return folder
 
 

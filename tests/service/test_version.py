@@ -39,7 +39,7 @@ def test_the_hash_names_every_library_that_deciding_code_imports() -> None:
     names = {name for room in version._GRADER_FOLDERS for name in imported(ROOT / room)}
     known = packages_distributions()
     third_party = {name for name in names if name not in sys.stdlib_module_names and name in known}
-    needed = {known[name][0].lower().replace("_", "-") for name in third_party - set(HARMLESS)} - {"robomark", "robomark-notebook"}
+    needed = {known[name][0].lower().replace("_", "-") for name in third_party - set(HARMLESS)} - {"robomark"}
     assert needed <= {name.lower() for name in version._DISTRIBUTIONS}
 
 
