@@ -14,7 +14,8 @@ from typing import Any
 from robomark_notebook import outputs
 from robomark_notebook.engine import EngineError, Submitted
 from robomark_notebook.notebook_files import read_saved_notebook
-from robomark_notebook.session import TOKEN_VARIABLE, URL_VARIABLE, Session, check_address
+from robomark_notebook.server_address import parse_address
+from robomark_notebook.session import TOKEN_VARIABLE, URL_VARIABLE, Session
 
 #: Seconds between two looks at a submission, and the time after which the cell stops looking.
 _POLL_SECONDS, _FOLLOW_SECONDS = 2.0, 600.0
@@ -66,7 +67,7 @@ def _connect(session: Session, words: Sequence[str], names: Names) -> None:
     given = words[0] if words else os.environ.get(URL_VARIABLE, "")
     if not given:
         raise EngineError(f"Expected %robomark connect URL, or the address in the environment variable {URL_VARIABLE}.")
-    url = check_address(given)
+    url = str(parse_address(given))
     session.connect(url, os.environ.get(TOKEN_VARIABLE) or _ask_for_token(url))
     print(describe_state(session))
 

@@ -7,14 +7,12 @@ Requests are idempotent, so that they can be sent again after a lost connection.
 from __future__ import annotations
 
 import json
-import re
 import time
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
-from urllib.parse import urlsplit
 
 import httpx
 
@@ -28,6 +26,7 @@ from robomark_notebook.engine import (
     Submitted,
 )
 from robomark_notebook.results import describe_call, read_check, read_grade, read_magic_result, read_question
+from robomark_notebook.server_address import parse_address
 
 #: Longest wait of one request for a run, for all of its requests, and for a server that cannot be reached.
 _WAIT_SECONDS, _MAX_SECONDS, _UNREACHABLE_SECONDS = 15.0, 900.0, 60.0
@@ -36,8 +35,6 @@ _TIMEOUT = httpx.Timeout(60.0, connect=10.0)
 _MAX_ANSWERS = 200
 #: Far more than the robot accepts.
 _MAX_ANSWER_LENGTH = 100_000
-_LOCAL_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
-_COURSE = re.compile(r"/courses/([0-9]{1,9})(?:/.*)?$")
 #: Answers of a server that is busy or restarts. The request is sent again.
 _BUSY = frozenset({429, 502, 503, 504})
 
@@ -61,7 +58,8 @@ class ServerEngine:
             EngineError: The server cannot be reached, or does not accept the token; or the course is not known.
         """
         self.seed = seed
-        self.url, number = _parse_address(url)
+        address = parse_address(url)
+        self.url = address.server
         if not token.isascii() or not token.isprintable() or not token.strip():
             raise EngineError(f"This is not a token. Create one on {self.url}/account, and copy it whole.")
         self._client = httpx.Client(
@@ -70,7 +68,7 @@ class ServerEngine:
             timeout=_TIMEOUT,
         )
         try:
-            self._course_id = self._find_course(number, course)
+            self._course_id = self._find_course(address.course_id, course)
         except BaseException:
             self.close()
             raise
@@ -228,25 +226,6 @@ def _naming_problems(url: str) -> Iterator[None]:
         ) from None
     except httpx.InvalidURL:
         raise EngineError(f"{url} is not an address. Expected one such as https://robomark.example.org.") from None
-
-
-def _parse_address(url: str) -> tuple[str, int | None]:
-    """Return the server's address without a final slash, and the number of the course in it, if any."""
-    text = url.strip() if "://" in url else f"https://{url.strip()}"
-    try:
-        parts = urlsplit(text)
-        host, _port = parts.hostname, parts.port
-    except ValueError:
-        host = None
-    if not host or parts.scheme not in ("https", "http") or parts.username is not None:
-        raise EngineError(
-            f"{url[:200]} is not the address of a server. Expected one such as https://robomark.example.org."
-        )
-    if parts.scheme == "http" and host not in _LOCAL_HOSTS:
-        raise EngineError(f"Connect with https://{host}: over http, others on the network could read your token.")
-    course = _COURSE.search(parts.path)
-    path = parts.path[: course.start()] if course else parts.path
-    return f"{parts.scheme}://{parts.netloc}{path}".rstrip("/"), int(course[1]) if course else None
 
 
 def _clean_answer(answer: str | None) -> str | None:

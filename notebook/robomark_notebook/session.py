@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import os
 from typing import cast
-from urllib.parse import urlsplit
 
 from robomark_notebook.engine import Answerer, Engine, EngineError, MagicCall, MagicResult, Page
 
@@ -79,18 +78,6 @@ class Session:
         engine = _create_engine(url, token)
         self.close()
         self.url, self._token, self._engine = url, token, engine
-
-
-def check_address(url: str) -> str:
-    """Return the address of a server without its final slash.
-
-    Raises:
-        EngineError: It is not an address.
-    """
-    address = urlsplit(url)
-    if address.scheme not in ("http", "https") or not address.netloc:
-        raise EngineError(f"{url[:80]} is not the address of a server. Expected one such as https://robomark.example.")
-    return url.rstrip("/")
 
 
 def _create_engine(url: str, token: str) -> Engine:

@@ -17,6 +17,7 @@ from PIL import Image
 
 from fake_engine import FakeEngine, build_replay
 from notebook_shell import NotebookShell
+from paths import ROOT
 from replays import poisoned
 from report_builders import line_follower_recording
 from robomark_notebook import outputs, picture, texts
@@ -145,9 +146,12 @@ def test_the_texts_of_the_replay_are_those_of_the_reports(package: Any) -> None:
 
 
 def test_the_widget_has_the_component_of_the_reports() -> None:
-    shared = load_report_script().split("// Starts the replays of a page")[0].partition('"use strict";\n')[2]
-    assert len(shared) > 30_000
-    assert shared.strip() in str(ReplayWidget._esm)
+    parts = sorted((ROOT / "service" / "reports" / "replay" / "component").glob("*.js"))
+    assert len(parts) >= 7
+    for part in parts:
+        code = part.read_text()
+        assert code in load_report_script()
+        assert code in str(ReplayWidget._esm)
 
 
 def test_the_state_of_a_run_without_trials_is_empty() -> None:
