@@ -1,19 +1,40 @@
-"""A virtual environment with the notebook's wheel and Jupyter, on another Python if there is one."""
+"""A virtual environment with the notebook's wheel and Jupyter, on another Python if there is one, and its servers."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from notebook_builder import document
 from notebook_package import build_wheel
 
-_INSTALL_SECONDS = 900
+_INSTALL_SECONDS, _START_SECONDS, _END_SECONDS = 900, 90, 20
+_TOKEN = "a-token-of-the-tests"
+#: A responder, a run that ends with a fault, and a check.
+CELLS = [
+    "%load_ext robomark_notebook",
+    "def responder(text):\n    return 'answer to ' + text",
+    "%%sim_magic_preloaded -b Loop -x 500 -y 500 -a 90 -R --collab\n"
+    "tank_drive.on(SpeedPercent(40), SpeedPercent(40))\n"
+    "print('PY::at the start')\n"
+    "while colorLeft.reflected_light_intensity_pc > 95:\n    pass\n"
+    "tank_drive.off()\nsay('There it is')\nprint(undefined_name)",
+    "%robomark check stop-at-black-line task.ipynb",
+]
+FAULT = "is not defined"
 
 
 def find_python() -> Path:
@@ -79,3 +100,52 @@ def build_variables(folder: Path, **variables: str) -> dict[str, str]:
         "ROBOMARK_COMMAND": str(Path(sys.executable).with_name("robomark")),
         **variables,
     }
+
+
+@contextmanager
+def serving_jupyter(
+    environment: JupyterEnvironment, module: str, folder: Path, theme: str = "JupyterLab Light"
+) -> Iterator[str]:
+    """Yield the address of a server for the notebooks of a folder. ``module`` is ``jupyterlab`` or ``notebook``."""
+    settings = folder / ".jupyter" / "lab" / "user-settings" / "@jupyterlab" / "apputils-extension"
+    settings.mkdir(parents=True, exist_ok=True)
+    (settings / "themes.jupyterlab-settings").write_text(json.dumps({"theme": theme}))
+    (settings / "notification.jupyterlab-settings").write_text(json.dumps({"fetchNews": "false"}))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    flags = ["--no-browser", "--allow-root", "--ip=127.0.0.1", f"--port={port}", f"--IdentityProvider.token={_TOKEN}"]
+    command = [str(environment.python), "-m", module, *flags, f"--ServerApp.root_dir={folder}"]
+    log = folder / ".server.log"
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            command, cwd=folder, env=build_variables(folder), stdout=output, stderr=subprocess.STDOUT
+        )
+    try:
+        _wait_for(f"http://127.0.0.1:{port}/api/status?token={_TOKEN}", log)
+        place = "lab/tree" if module == "jupyterlab" else "notebooks"
+        yield f"http://127.0.0.1:{port}/{place}/task.ipynb?token={_TOKEN}"
+    finally:
+        process.terminate()
+        try:
+            process.wait(_END_SECONDS)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _wait_for(url: str, log: Path) -> None:
+    end = time.monotonic() + _START_SECONDS
+    while time.monotonic() < end:
+        with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=5):
+            return
+        time.sleep(0.3)
+    pytest.fail(f"the server does not start:\n{log.read_text()[-2000:]}")
+
+
+def write_task(folder: Path, cells: list[str] = CELLS) -> Path:
+    """Write a notebook with the cells, ``task.ipynb`` in the folder."""
+    path = folder / "task.ipynb"
+    head = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
+    path.write_text(json.dumps({**document(cells), "metadata": head}))
+    return path

@@ -2,44 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from pathlib import Path
 
 import pytest
 
-from jupyter_environment import JupyterEnvironment, create_environment
-from notebook_builder import document
+from jupyter_environment import FAULT, JupyterEnvironment, create_environment, write_task
 from paths import ROOT
 
 pytestmark = pytest.mark.long
 
 TUTORIAL = ROOT / "docs" / "notebook.ipynb"
-RESPONDER = "def responder(text):\n    return 'answer to ' + text"
-CELLS = [
-    "%load_ext robomark_notebook",
-    RESPONDER,
-    "%%sim_magic_preloaded -b Loop -x 500 -y 500 -a 90 -R --collab\n"
-    "tank_drive.on(SpeedPercent(40), SpeedPercent(40))\n"
-    "print('PY::at the start')\n"
-    "while colorLeft.reflected_light_intensity_pc > 95:\n    pass\n"
-    "tank_drive.off()\nsay('There it is')\nprint(undefined_name)",
-    "%robomark check stop-at-black-line task.ipynb",
-]
-FAULT = "is not defined"
 
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> JupyterEnvironment:
     return create_environment(tmp_path_factory.mktemp("jupyter"), "nbconvert")
-
-
-def write_task(folder: Path, cells: list[str] = CELLS) -> Path:
-    path = folder / "task.ipynb"
-    head = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
-    path.write_text(json.dumps({**document(cells), "metadata": head}))
-    return path
 
 
 def convert(environment: JupyterEnvironment, folder: Path, *words: str) -> None:

@@ -246,7 +246,9 @@ class SourcePanel {
     }
     if (latest === this.at) return;
     this.at = latest;
-    this.lines.querySelector("[aria-current]")?.removeAttribute("aria-current");
+    const earlier = this.lines.querySelector("[aria-current]");
+    earlier?.removeAttribute("aria-current");
+    earlier?.classList.remove("wrong");
     this.known.textContent = latest ? say("line", { number: latest.line[1], seconds: seconds(latest.t) })
       : say("lineUnknown");
     if (!latest) return;
