@@ -4,8 +4,9 @@ async function render({ model, el }) {
   const report = element("div");
   const root = element("div", { className: "component" });
   const section = element("section", { className: "replay" }, root);
-  // Otherwise JupyterLab takes the arrow keys for its own.
-  const frame = element("div", { className: "robomark", "data-lm-suppress-shortcuts": "true" }, report, section);
+  const frame = element("div", { className: "robomark" }, report, section);
+  // Otherwise Jupyter takes the keys for its own. It asks the element with the focus before those around it.
+  frame.addEventListener("focusin", ({ target }) => target.setAttribute("data-lm-suppress-shortcuts", "true"));
   report.innerHTML = model.get("report"); // escaped where it is made
   el.append(frame);
   try {
