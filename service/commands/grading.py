@@ -155,13 +155,13 @@ def grade_all(
 
 
 def _read_reference(name_or_path: str, assignment: Assignment) -> Submission | None:
-    """Return the reference solution beside the assignment, if the assignment compares halves and has one."""
-    if not assignment.reruns.halves:
+    """Return the reference solution beside the assignment, if the search for causes uses it and there is one."""
+    if not assignment.reruns.uses_reference:
         return None
     try:
         return read_example(name_or_path, REFERENCE)
     except UsageError as error:
-        print_note(f"the reference solution cannot be used, so no parts of it are exchanged: {error}")
+        print_note(f"the reference solution cannot be used, so nothing of it is exchanged: {error}")
         return None
 
 

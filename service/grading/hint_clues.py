@@ -285,23 +285,24 @@ def remove_hidden_evidence(result: CriterionResult, visible_indices: Set[int]) -
 
 def _build_listings(submission: Submission, robots: int) -> Iterator[Listing]:
     if submission.program is not None:
-        yield _build_listing("robot.py", "program", submission.program.text)
+        yield build_listing("robot.py", "program", submission.program.text)
     if submission.responder is not None:
-        yield _build_listing("responder.py", "responder", submission.responder.text)
+        yield build_listing("responder.py", "responder", submission.responder.text)
     second_program = submission.find_code(SECOND_PROGRAM) if robots == 2 else None
     if second_program is not None:
-        yield _build_listing(SECOND_PROGRAM, "program", second_program.text)
+        yield build_listing(SECOND_PROGRAM, "program", second_program.text)
     for cell in submission.notebook.cells if submission.notebook is not None else ():
-        yield _build_listing(name_cell(cell.number), None, cell.source)
+        yield build_listing(name_cell(cell.number), None, cell.source)
 
 
 def _build_extra_listings(submission: Submission) -> Iterator[Listing]:
     for name in [each for each in sorted(submission.files) if each.endswith(".py")][:_MAX_EXTRA_FILES]:
         if name in submission.python_files:
-            yield _build_listing(name, None, submission.python_files[name].text)
+            yield build_listing(name, None, submission.python_files[name].text)
 
 
-def _build_listing(name: str, part: Part | None, text: str) -> Listing:
+def build_listing(name: str, part: Part | None, text: str) -> Listing:
+    """Return the lines of a text, up to their limits."""
     lines = tuple(line[:_MAX_LINE_LENGTH].rstrip("\r") for line in text.split("\n", _MAX_LINES)[:_MAX_LINES])
     return Listing(name, part, lines)
 

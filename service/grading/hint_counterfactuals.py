@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from service.grading.grade import TrialResult
-from service.grading.hint_clues import Clues, Listing, describe_first_failure
+from service.grading.hint_clues import Clues, Listing, build_listing, describe_first_failure
 from service.grading.hint_code import CallInCode, Statement
 from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
@@ -23,12 +23,14 @@ from service.grading.judging.judge import JUDGES
 from service.grading.judging.judge_declaration import Case, StaticAnalysis
 from sim.recording import Pose, Recording
 from sim.sentences import Sentence, make_clause
+from submissions.assignment.definition import Assignment
 from submissions.criteria import Criterion
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.ending import EndPose
 from submissions.criteria.motion import Displacement, Excursions, Moves
 from submissions.criteria.path import KeepsOut, Visits
 from submissions.criteria.point import Circuits
+from submissions.submission import PART_FILES
 
 #: Criteria that depend on the path alone.
 _PATH_CRITERIA = (Circuits, Displacement, Drawing, EndPose, Excursions, KeepsOut, Moves, Visits)
@@ -60,17 +62,17 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
     failure = describe_first_failure(clues, criterion)
     if not failure:  # only hidden trials lost marks
         return
-    trials = _collect_path_trials(clues, criterion, listing)
+    definition, trials = clues.definition, _collect_path_trials(criterion, clues.shown, listing)
     if not trials:
         return
-    best = _find_best_change(clues, criterion, trials, listing)
+    best = _find_best_change(definition, criterion, trials, listing)
     if best is not None:
         yield _describe_change(*best, failure)
         return
     ticks = sum(len(each.recording.ticks) for each in trials)
     for first, second, order in _collect_exchanges(listing, trials)[: min(_MAX_LINES, _MAX_TICKS // max(ticks, 1))]:
         exchanged = [replace(each, recording=_reorder_motion(each.recording, order)) for each in trials]
-        if _has_full_marks(criterion, clues, exchanged):
+        if _has_full_marks(criterion, definition, exchanged):
             yield Sentence(
                 "%(place)s: %(problem)s. Lines %(line)s and %(other_line)s are in the wrong order: exchange them",
                 place=listing.locate(first.line),
@@ -81,37 +83,38 @@ def hint_about_wrong_number(clues: Clues) -> Iterator[str]:
             return
 
 
-def find_scaled_line(clues: Clues, criterion_id: str) -> tuple[str, int, float] | None:
-    """Return a file, a line and the factor of its motion with which the recorded path would meet the criterion.
+def find_scaled_line(
+    program: str, definition: Assignment, criterion: Criterion, trials: Sequence[TrialResult]
+) -> tuple[int, float] | None:
+    """Return a line of a program and the factor of its motion with which the recorded paths would meet the criterion.
 
     The factor is negative for the opposite direction. None if the search does not apply, or finds none.
     """
-    listing = next(iter(clues.programs), None)
-    criterion = next((each for each in clues.lost if each.id == criterion_id), None)
-    if listing is None or not isinstance(criterion, _PATH_CRITERIA) or clues.definition is None:
+    if not isinstance(criterion, _PATH_CRITERIA):
         return None
-    best = _find_best_change(clues, criterion, _collect_path_trials(clues, criterion, listing), listing)
-    return None if best is None else (listing.name, best[0].statement.line, best[1])
+    listing = build_listing(PART_FILES["program"], "program", program)
+    best = _find_best_change(definition, criterion, _collect_path_trials(criterion, trials, listing), listing)
+    return None if best is None else (best[0].statement.line, best[1])
 
 
-def _collect_path_trials(clues: Clues, criterion: Criterion, listing: Listing) -> list[TrialResult]:
-    """Return the visible trials of the criterion; empty if their paths depend on more than the program's numbers."""
-    trials = [each for each in clues.shown if not criterion.scenarios or each.scenario in criterion.scenarios]
+def _collect_path_trials(criterion: Criterion, shown: Sequence[TrialResult], listing: Listing) -> list[TrialResult]:
+    """Return the trials of the criterion; empty if their paths depend on more than the program's numbers."""
+    trials = [each for each in shown if not criterion.scenarios or each.scenario in criterion.scenarios]
     is_unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
     return [] if is_unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements) else trials
 
 
 def _find_best_change(
-    clues: Clues, criterion: Criterion, trials: list[TrialResult], listing: Listing
+    definition: Assignment, criterion: Criterion, trials: list[TrialResult], listing: Listing
 ) -> tuple[_Change, float] | None:
     """Return the change and the factor with full marks for the criterion that gives the most marks together."""
-    if not trials or clues.definition is None:
+    if not trials:
         return None
-    visible_criteria = [each for each in clues.definition.criteria if each.visibility == "visible"]
+    visible_criteria = [each for each in definition.criteria if each.visibility == "visible"]
     path_criteria = [each for each in visible_criteria if isinstance(each, _PATH_CRITERIA)]
     remaining_ticks = _MAX_TICKS
     ticks = sum(len(each.recording.ticks) for each in trials)
-    current_marks = [_compute_marks(each, clues, trials) for each in path_criteria]
+    current_marks = [_compute_marks(each, definition, trials) for each in path_criteria]
     best: tuple[float, float, _Change, float] | None = None
     for change in list(_collect_changes(listing, trials))[:_MAX_LINES]:
         passing_factors = []
@@ -119,13 +122,13 @@ def _find_best_change(
             remaining_ticks -= ticks
             if remaining_ticks < 0:
                 break
-            if _has_full_marks(criterion, clues, _apply_change(trials, change, factor)):
+            if _has_full_marks(criterion, definition, _apply_change(trials, change, factor)):
                 passing_factors.append(factor)
         if not passing_factors:
             continue
         factor = _choose_factor(passing_factors)
         changed_trials = _apply_change(trials, change, factor)
-        marks = [_compute_marks(each, clues, changed_trials) for each in path_criteria]
+        marks = [_compute_marks(each, definition, changed_trials) for each in path_criteria]
         if any(new < old for new, old in zip(marks, current_marks, strict=True)):
             continue  # it would lose marks that the program has
         total = sum(marks)
@@ -259,16 +262,16 @@ def _rebuild_path(recording: Recording, steps: np.ndarray, left: np.ndarray, rig
     return replace(recording, ticks=changed_ticks, end=end)
 
 
-def _has_full_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> bool:
-    return _compute_marks(criterion, clues, trials) >= _MIN_PASS_SHARE * float(criterion.marks)
+def _has_full_marks(criterion: Criterion, definition: Assignment, trials: list[TrialResult]) -> bool:
+    return _compute_marks(criterion, definition, trials) >= _MIN_PASS_SHARE * float(criterion.marks)
 
 
-def _compute_marks(criterion: Criterion, clues: Clues, trials: list[TrialResult]) -> float:
+def _compute_marks(criterion: Criterion, definition: Assignment, trials: list[TrialResult]) -> float:
     """Return the marks of a criterion for changed trials; 0 if it looks at none of them."""
     is_relevant = any(not criterion.scenarios or each.scenario in criterion.scenarios for each in trials)
-    if clues.definition is None or not is_relevant:
+    if not is_relevant:
         return 0.0
-    case = Case(clues.definition, trials, StaticAnalysis(), {})
+    case = Case(definition, trials, StaticAnalysis(), {})
     return float(JUDGES[type(criterion)].judge(criterion, case).marks)
 
 

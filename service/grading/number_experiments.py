@@ -7,24 +7,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import CriterionResult, Grade
 from service.grading.grader import grade
-from service.grading.number_roles import WHOLE_ROLES, Direction, NumberRole, find_direction, find_lines, find_role
+from service.grading.number_roles import Direction, NumberRole, find_direction
 from service.grading.pools.drawing import PoolExtent
+from service.grading.program_numbers import ProgramNumber
 from service.grading.trial_runner import TrialRunner
 from service.grading.trial_selection import PartialAssignment, needs_every_trial, select_trials
-from service.mutation.source_tree import Edit, SourceTree
+from service.mutation.source_tree import SourceTree
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.criteria import AnyCriterion
 from submissions.seeds import SeedSource
 from submissions.submission import PART_FILES, SECOND_PROGRAM, Submission
-
-#: Numbers beyond these are not changed.
-_MAX_NUMBERS = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,38 +55,6 @@ class NumberChange:
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramNumber:
-    """A number in a student's program. ``index`` is its place among all of them."""
-
-    index: int
-    file: str
-    tree: SourceTree = field(repr=False, compare=False)
-    start: int
-    end: int
-    line: int
-    value: float
-    role: NumberRole
-    lines: frozenset[int]  # its line, and those that use the constant
-
-    @property
-    def column(self) -> int:
-        """The column in the line, from 1."""
-        return self.start - self.tree.find_line_start(self.line) + 1
-
-    @property
-    def is_whole(self) -> bool:
-        """Return whether only whole numbers make sense."""
-        return self.role in WHOLE_ROLES and float(self.value).is_integer()
-
-    def format_value(self, value: float) -> str:
-        """Return a new value as a student would write it."""
-        if self.is_whole:
-            return str(round(value))
-        text = f"{value:.3g}" if abs(value) < 1000 else f"{value:.0f}"
-        return text if float(text) != self.value else f"{value:.5g}"
-
-
-@dataclass(frozen=True, slots=True)
 class NumberTrial:
     """The outcome with a changed number: whether it passes, the met part of the criterion, hashes of recordings."""
 
@@ -109,22 +76,13 @@ class GradedCriterion:
     extent: PoolExtent
 
 
-def collect_numbers(submission: Submission, assignment: Assignment) -> list[ProgramNumber]:
-    """Return the numbers of the student's parts, those without an obvious role last. Unreadable files have none."""
-    found_numbers = []
+def read_student_files(submission: Submission, assignment: Assignment) -> dict[str, SourceTree]:
+    """Return the files of the student's parts by name, without those that are not Python."""
+    trees = {}
     for file, text in _list_texts(submission, assignment):
-        try:
-            tree = SourceTree(text)
-        except UsageError:
-            continue
-        found_numbers += [(file, tree, number, find_role(tree, number)) for number in tree.numbers]
-    found_numbers.sort(key=lambda each: each[3] in ("index", "number"))
-    return [
-        ProgramNumber(
-            index, file, tree, number.start, number.end, number.line, number.value, role, find_lines(tree, number)
-        )
-        for index, (file, tree, number, role) in enumerate(found_numbers[:_MAX_NUMBERS])
-    ]
+        with suppress(UsageError):
+            trees[file] = SourceTree(text)
+    return trees
 
 
 def _list_texts(submission: Submission, assignment: Assignment) -> Iterator[tuple[str, str]]:
@@ -173,7 +131,7 @@ class NumberExperiments:
         """Run the submission with another number. Raises BudgetSpent."""
         key = number.index, number.format_value(value)
         if key not in self._outcomes:
-            self._outcomes[key] = self._run(self._change(number, key[1]))
+            self._outcomes[key] = self._run(self._change(number, value))
         return self._outcomes[key]
 
     def build_change(self, number: ProgramNumber, value: float) -> NumberChange | None:
@@ -184,7 +142,7 @@ class NumberExperiments:
         """
         text = number.format_value(value)
         case = self.case
-        graded = self._grade(self._change(number, text), case.assignment, len(case.graded.trials))
+        graded = self._grade(self._change(number, value), case.assignment, len(case.graded.trials))
         result = self._find_result(graded)
         if result.marks < result.max_marks:
             return None
@@ -193,13 +151,13 @@ class NumberExperiments:
             number.file,
             number.line,
             number.column,
-            number.tree.text[number.start : number.end],
+            number.old,
             text,
             number.role,
             find_direction(number.value, new_value, number.role),
             abs(new_value - number.value) / (abs(number.value) or 1),
             graded.marks,
-            sum(each.line == number.line for each in number.tree.numbers) == 1,
+            number.is_alone_on_line,
         )
 
     def _run(self, submission: Submission) -> NumberTrial:
@@ -212,8 +170,8 @@ class NumberExperiments:
         recordings = tuple(each.recording.sha256 for each in graded.trials)
         return NumberTrial(passes, float(result.marks / result.max_marks), recordings)
 
-    def _change(self, number: ProgramNumber, text: str) -> Submission:
-        return self.case.submission.with_source(number.file, number.tree.apply(Edit(number.start, number.end, text)))
+    def _change(self, number: ProgramNumber, value: float) -> Submission:
+        return self.case.submission.with_source(number.file, number.change_text(value))
 
     def _find_result(self, graded: Grade) -> CriterionResult:
         return next(each for each in graded.criteria if each.id == self.case.criterion.id)

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from service.grading.hint_clues import collect_clues
 from service.grading.hint_counterfactuals import find_scaled_line
 from service.grading.number_experiments import (
     BudgetSpent,
@@ -20,12 +19,21 @@ from service.grading.number_experiments import (
     NumberChange,
     NumberExperiments,
     NumberTrial,
-    ProgramNumber,
     SearchBudget,
-    collect_numbers,
+    read_student_files,
 )
 from service.grading.number_roles import describe_direction
+from service.grading.program_numbers import (
+    Candidate,
+    ProgramNumber,
+    collect_numbers,
+    suggest_other_speeds,
+    suggest_rotations,
+    suggest_scaled_numbers,
+    suggest_thresholds,
+)
 from service.grading.run_plan import plan_run
+from service.grading.trial_specs import build_trial_spec
 from sim.sentences import Sentence
 
 #: Numbers are left out of the grid if this many values change no recording.
@@ -52,9 +60,6 @@ _PRECISION = math.log(1.01)
 _MAX_BISECTIONS = 8
 
 DEFAULT_BUDGET = SearchBudget()
-
-#: A number and a new value.
-Candidate = tuple[ProgramNumber, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +93,7 @@ def find_nearest_number(case: GradedCriterion, budget: SearchBudget = DEFAULT_BU
     Raises:
         HostError: The machine failed.
     """
-    numbers = collect_numbers(case.submission, case.assignment)
+    numbers = collect_numbers(read_student_files(case.submission, case.assignment))
     if not numbers or not case.criterion.marks:
         return NumberSearch(case.criterion.id, None, 0, False)
     try:
@@ -162,20 +167,20 @@ class _Search:
                 self.change = self._experiments.build_change(number, nearest_value) or self.change
 
     def _suggest_values(self) -> Iterator[Candidate]:
-        """Yield what the recorded path suggests, then the values of other numbers of the same kind on the line."""
+        """Yield what the recorded path and the world suggest."""
         case = self._experiments.case
+        visible_trials = [each for each in case.graded.trials if each.visibility == "visible"]
+        if case.submission.program is not None:
+            scaled_line = find_scaled_line(
+                case.submission.program.text, case.assignment, case.criterion, visible_trials
+            )
+            yield from suggest_scaled_numbers(self._numbers, scaled_line)
+        yield from suggest_other_speeds(self._numbers)
         plan = plan_run(case.submission, case.assignment, case.secret)
-        clues = collect_clues(case.submission, plan, case.graded.trials, case.graded.criteria)
-        scaled_line = find_scaled_line(clues, case.criterion.id)
-        if scaled_line is not None:
-            file, line, factor = scaled_line
-            numbers = [each for each in self._numbers if each.file == file and line in each.lines and each.value]
-            # A number may also be a divisor.
-            yield from ((each, each.value * scale) for each in numbers for scale in (factor, 1 / factor))
-        for number, other in itertools.permutations(self._numbers, 2):
-            is_pair = (number.file, number.line) == (other.file, other.line) and "speed" in number.role
-            if is_pair and "speed" in other.role and abs(number.value) != abs(other.value):
-                yield number, math.copysign(other.value, number.value)
+        if plan.program is not None:
+            spec = build_trial_spec(next(iter(case.assignment.trials(case.secret))), plan)
+            yield from suggest_rotations(self._numbers, spec.robot)
+            yield from suggest_thresholds(self._numbers, spec.floor)
 
     def _has_no_effect(self, number: ProgramNumber) -> bool:
         """Return whether all values that were tried, at least two, left the recordings as they are."""

@@ -101,6 +101,17 @@ class RunPlan:
         participants = (answers, *self.agents.values(), self.program, self.second_program)
         return tuple(each for each in participants if each is not None)
 
+    def get_source(self, part: str) -> str | None:
+        """Return the text of a part as it runs: ``program``, ``responder``, ``second program``, or an agent's name.
+
+        Returns None if the submission does not have the part as a file of its own.
+        """
+        if isinstance(self.trial, NotebookTrial):
+            return None
+        specs = {"program": self.program, "responder": self.responder, "second program": self.second_program}
+        spec = specs.get(part) or self.agents.get(part)
+        return None if spec is None else spec.code.text
+
     def to_hidden_plan(self) -> RunPlan:
         """Return the plan for hidden trials. Recorded statements could reveal sensor values, so none are recorded."""
         program, second_program, answers = self.program, self.second_program, self.responder

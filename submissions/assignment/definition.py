@@ -69,13 +69,19 @@ class Reruns:
     """What students learn from reruns of their trials with one ingredient exchanged.
 
     Without ``causes``, no trials are run again. With ``halves``, the reference's parts take the place of the student's,
-    to show which part loses the marks. ``reveals`` is the number of causes in hidden trials that one student may see;
-    staff see all.
+    to show which part loses the marks; with ``statements``, single statements and texts of the reference do, to show
+    the line. ``reveals`` is the number of causes in hidden trials that one student may see; staff see all.
     """
 
     causes: bool = True
     halves: bool = False
+    statements: bool = False
     reveals: int = 0
+
+    @property
+    def uses_reference(self) -> bool:
+        """Return whether anything of the reference takes the place of the student's."""
+        return self.halves or self.statements
 
 
 NO_RERUNS = Reruns()

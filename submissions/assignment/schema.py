@@ -232,6 +232,7 @@ class RerunsTable(StrictTable):
 
     causes: bool = True
     halves: bool = False
+    statements: bool = False
     reveals: int = Field(default=0, ge=0, le=100)
 
 

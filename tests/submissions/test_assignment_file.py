@@ -157,7 +157,10 @@ BOTH = "[reruns]\n{}\n" + SCENARIO + FINISHES
     ("tables", "mistake"),
     [
         (BOTH.format('halves = "yes"'), 'halves is "yes", expected true or false'),
-        (BOTH.format("halfs = true"), '"halfs" is not a key of this table, expected "causes", "halves" or "reveals"'),
+        (
+            BOTH.format("halfs = true"),
+            '"halfs" is not a key of this table, expected "causes", "halves", "statements" or "reveals"',
+        ),
         (BOTH.format("reveals = -1"), "reveals is -1, expected at least 0"),
         (BOTH.format("reveals = 2"), "reveals is 2, but every scenario is visible, expected a hidden scenario with it"),
         (

@@ -14,6 +14,7 @@ from service.grading.reruns.causes import Cause, CauseKind
 from service.grading.reruns.engine import Rerun
 from service.grading.reruns.exchanges import (
     ChangedLine,
+    ChangeKind,
     Exchange,
     MoreTime,
     VisibleStart,
@@ -43,6 +44,30 @@ _EFFECTS: Mapping[str, str] = MappingProxyType(
         "reordering": translatable("no message out of order"),
         "corruption": translatable("no message changed"),
         "jitter": translatable("the same delay for every message"),
+    }
+)
+
+
+_LINE_SENTENCES: Mapping[ChangeKind, str] = MappingProxyType(
+    {
+        "changed": translatable("With one change in line %(line)s of %(file)s, the same submission %(result)s."),
+        "added": translatable(
+            "With one more statement after line %(line)s of %(file)s, the same submission %(result)s."
+        ),
+        "wait": translatable("With a wait after line %(line)s of %(file)s, the same submission %(result)s."),
+        "removed": translatable("Without the statement in line %(line)s of %(file)s, the same submission %(result)s."),
+    }
+)
+
+
+_FOLLOWING_STEP = translatable("Check what follows line %(line)s of %(file)s, then submit again.")
+_LINE_STEP = translatable("Check line %(line)s of %(file)s, then submit again.")
+_STAFF_SENTENCES: Mapping[ChangeKind, str] = MappingProxyType(
+    {
+        "changed": translatable("For staff: in line %(line)s, %(old)s became %(new)s."),
+        "added": translatable("For staff: after line %(line)s, this was added: %(new)s."),
+        "wait": translatable("For staff: after line %(line)s, this was added: %(new)s."),
+        "removed": translatable("For staff: in line %(line)s, this was removed: %(old)s."),
     }
 )
 
@@ -109,7 +134,8 @@ def describe_next_step(cause: Cause) -> str:
             return describe_part_step(cause.reruns, cause.criterion)
         case "line":
             (change,) = (each for each in cause.reruns[0].exchanges if isinstance(each, ChangedLine))
-            return Sentence("Check line %(line)s of %(file)s, then submit again.", line=change.line, file=change.file)
+            step = _FOLLOWING_STEP if change.kind in ("added", "wait") else _LINE_STEP
+            return Sentence(step, line=change.line, file=change.file)
         case "time":
             return Sentence("Make your program faster, or its waits shorter, then submit again.")
         case "start":
@@ -214,7 +240,7 @@ def _describe_line(reruns: Sequence[Rerun], criterion: str) -> str:
     if not rerun.passes(criterion):
         return ""
     sentence = Sentence(
-        "With one change in line %(line)s of %(file)s, the same submission %(result)s.",
+        _LINE_SENTENCES[change.kind],
         line=change.line,
         file=change.file,
         result=describe_result(rerun, criterion),
@@ -229,11 +255,15 @@ def _describe_change(causes: Sequence[Cause]) -> str:
     if change is None:
         return ""
     return Sentence(
-        "For staff: in line %(line)s, %(old)s became %(new)s.",
+        _STAFF_SENTENCES[change.kind],
         line=change.line,
-        old=" ".join(change.old.split())[:_MAX_CHANGE] or '""',
-        new=" ".join(change.new.split())[:_MAX_CHANGE] or '""',
+        old=_shorten(change.old),
+        new=_shorten(change.new),
     )
+
+
+def _shorten(text: str) -> str:
+    return " ".join(text.split())[:_MAX_CHANGE] or '""'
 
 
 _DESCRIPTIONS: Mapping[CauseKind, Callable[[Sequence[Rerun], str], str]] = MappingProxyType(

@@ -10,9 +10,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from service.grading.reruns.changed_lines import find_changed_line
+from service.grading.reruns.changed_lines import count_lost_marks, find_changed_line
 from service.grading.reruns.engine import DEFAULT_BUDGET, Budget, BudgetSpent, Rerun, RerunEngine
 from service.grading.reruns.exchanges import (
+    ChangedLine,
     Exchange,
     MoreTime,
     OtherNoise,
@@ -70,7 +71,8 @@ def find_causes(
 
     Args:
         engine: The engine, for the trials that may be run again.
-        reference: The plan of the reference, if its parts may take the place of the student's.
+        reference: The plan of the reference, if there is one. The assignment says what of it may take the place of the
+            student's.
         finders: Further searches, after those of this module.
         budget: What each criterion may cost.
         explained: The ids of criteria whose causes are known.
@@ -93,7 +95,8 @@ def find_causes(
                 for cause in itertools.islice(finder(engine, criterion.id), _MAX_CAUSES - len(found_causes)):
                     found_causes.append(cause)  # at once, because the finder may use up the budget
             if all(each.kind == "parts" for each in found_causes):
-                found_causes += _find_line(engine, criterion.id, found_causes)
+                known_changes = _list_changed_lines(causes)
+                found_causes = _add_line(engine, criterion.id, found_causes, known_changes, reference)
             if not found_causes:
                 found_causes += _find_start(engine, criterion.id)
             if len(found_causes) < _MAX_CAUSES:
@@ -101,7 +104,7 @@ def find_causes(
         except BudgetSpent:
             pass
         causes += found_causes
-    return tuple(causes)
+    return tuple(_choose_best_line(each, causes) for each in causes)
 
 
 def _build_cause(engine: RerunEngine, criterion: str, kind: CauseKind, *reruns: Rerun) -> Cause:
@@ -112,7 +115,9 @@ def _build_cause(engine: RerunEngine, criterion: str, kind: CauseKind, *reruns: 
 def _build_part_finder(reference: RunPlan | None) -> CauseFinder:
     def find_part(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
         parts = list_student_parts(engine.assignment)
-        if reference is None or not engine.has_exchangeable_parts or len(parts) < 2:
+        if reference is None or not engine.assignment.reruns.halves or len(parts) < 2:
+            return
+        if not engine.has_exchangeable_parts:
             return
         reruns = find_losing_parts(engine, criterion, parts, reference)
         if not reruns:
@@ -160,14 +165,39 @@ def _find_time(engine: RerunEngine, criterion: str) -> Iterator[Cause]:
             yield _build_cause(engine, criterion, "time", rerun)
 
 
-def _find_line(engine: RerunEngine, criterion: str, part_causes: Sequence[Cause]) -> Iterator[Cause]:
-    """Yield the line with which one change loses nothing, in the parts that lose the marks."""
+def _add_line(
+    engine: RerunEngine,
+    criterion: str,
+    part_causes: list[Cause],
+    known_changes: Sequence[ChangedLine],
+    reference: RunPlan | None,
+) -> list[Cause]:
+    """Return the causes with the line with which one change loses nothing, in the parts that lose the marks.
+
+    One change does not show what is wrong with parts that do not fit together. The line takes the place of parts that
+    still lose marks beside the reference's, because it shows that one of them is enough.
+    """
     parts = [part for cause in part_causes for part in decide_losing_parts(cause.reruns, criterion)]
-    if len(parts) > 1:
-        return  # one change would not show what is wrong with several parts
-    rerun = find_changed_line(engine, criterion, parts or list_student_parts(engine.assignment))
-    if rerun is not None:
-        yield _build_cause(engine, criterion, "line", rerun)
+    if len(parts) > 1 and any(rerun.passes(criterion) for cause in part_causes for rerun in cause.reruns):
+        return part_causes
+    given = reference if engine.assignment.reruns.statements and engine.has_exchangeable_parts else None
+    student_parts = list_student_parts(engine.assignment)
+    rerun = find_changed_line(engine, criterion, parts or student_parts, known_changes, given)
+    if rerun is None:
+        return part_causes
+    return [*(part_causes if len(parts) == 1 else ()), _build_cause(engine, criterion, "line", rerun)]
+
+
+def _list_changed_lines(causes: Sequence[Cause]) -> list[ChangedLine]:
+    exchanges = (each for cause in causes if cause.kind == "line" for rerun in cause.reruns for each in rerun.exchanges)
+    return [each for each in exchanges if isinstance(each, ChangedLine)]
+
+
+def _choose_best_line(cause: Cause, causes: Sequence[Cause]) -> Cause:
+    """Return a cause with the line of another criterion, if this change passes too and loses fewer marks."""
+    others = [each for each in causes if each.kind == cause.kind == "line" and each.reruns[0].passes(cause.criterion)]
+    best = min((cause, *others), key=lambda each: count_lost_marks(each.reruns[0])) if others else cause
+    return replace(best, criterion=cause.criterion)
 
 
 def _find_start(engine: RerunEngine, criterion: str) -> Iterator[Cause]:

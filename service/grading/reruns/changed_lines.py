@@ -1,106 +1,216 @@
-"""The line of a part with which one change loses nothing: a number, a sign, a comparison, a port, an order.
+"""The line of a part with which one change loses nothing: a statement of the reference, a repair, a mutant, a number.
 
-The changes are those that the mutation operators make of programs, and numbers that are much larger or smaller.
+The changes are tried one after the other, the likely ones first, until the budget is used up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import ast
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from decimal import Decimal
+from itertools import chain, zip_longest
 
-from service.grading.number_roles import describe_direction, find_direction, find_role
+from service.grading.reruns.answer_repairs import (
+    ExpectedTexts,
+    collect_expected_texts,
+    complete_json,
+    use_expected_texts,
+)
+from service.grading.reruns.changed_numbers import list_number_changes
 from service.grading.reruns.engine import BudgetSpent, Rerun, RerunEngine, RunTooLong
-from service.grading.reruns.exchanges import ChangedLine, PartName, get_part_file
+from service.grading.reruns.exchanges import ChangedLine, GivenPart, PartName, RecordedLines
+from service.grading.reruns.output_repairs import list_output_repairs
+from service.grading.reruns.reference_statements import list_reference_statements
+from service.grading.reruns.repairs import (
+    Repair,
+    add_waits,
+    add_waits_after_messages,
+    declare_globals,
+    exchange_operands,
+    exchange_sides,
+    move_into_and_out_of_loops,
+    remove_statements,
+    reread_values,
+    set_flags,
+    shift_indices,
+    stop_motors,
+)
+from service.grading.run_plan import RunPlan
 from service.mutation.mutants import choose_mutants, iterate_mutants
-from service.mutation.operators import format_number
-from service.mutation.source_tree import Edit, SourceTree
+from service.mutation.source_tree import SourceTree, is_python
 from sim.errors import UsageError
-from sim.sentences import Sentence
 from submissions.submission import Part
 
-#: Operators whose mutants can be what the author meant. The others only take something away.
-_OPERATORS = frozenset(
-    {
-        "comparison",
-        "condition",
-        "label swapped",
-        "off by one",
-        "port",
-        "sign",
-        "swapped statements",
-        "while and if",
-        "wrong unit",
-    }
-)
+#: Operators whose mutants can be what the author meant, and those whose mutants rarely are, or can be endless.
+_OPERATORS = frozenset({"comparison", "condition", "label swapped", "off by one", "port", "sign"})
+_LATE_OPERATORS = frozenset({"swapped statements", "while and if", "wrong unit"})
 _MAX_MUTANTS = 40
-_FACTORS = (1.5, 1 / 1.5, 2.0, 0.5, 1.2, 1 / 1.2, 3.0, 1 / 3)
+#: With more differences, the two programs are not versions of each other.
+_MAX_DIFFERENCES = 6
 
 
-def find_changed_line(engine: RerunEngine, criterion: str, parts: Sequence[PartName]) -> Rerun | None:
+def find_changed_line(
+    engine: RerunEngine,
+    criterion: str,
+    parts: Sequence[PartName],
+    known_changes: Sequence[ChangedLine] = (),
+    reference: RunPlan | None = None,
+) -> Rerun | None:
     """Return the rerun with the change that loses nothing for a criterion; None if the budget shows none.
 
-    Of several changes, the one that gives the most marks for all criteria counts, then the one that was tried first.
+    Of several changes, the one that loses the fewest marks for all criteria counts, then the one that was tried first.
+
+    Args:
+        engine: The engine.
+        criterion: The id of a criterion that lost marks.
+        parts: The parts to change.
+        known_changes: Changes that are tried first, if they are of these parts.
+        reference: The plan of the reference, if its statements may take the place of the student's.
 
     Raises:
         HostError: The machine failed.
     """
-    best: Rerun | None = None
-    try:
-        for change in _list_changes(engine, parts):
-            try:
-                rerun = engine.rerun_criterion(criterion, (change,))
-            except RunTooLong:
-                continue
-            if rerun.passes(criterion) and (best is None or _count_marks(rerun) > _count_marks(best)):
-                best = rerun
-                if all(each.marks >= each.max_marks for each in rerun.outcomes.values()):
-                    break
-    except BudgetSpent:
-        pass
-    return best
+    search = _LineSearch(engine, criterion, dict(_read_parts(engine, parts)), reference)
+    with suppress(BudgetSpent):
+        search.run([each for each in known_changes if each.part in parts])
+    return search.best
 
 
-def _count_marks(rerun: Rerun) -> Decimal:
-    return sum((each.marks for each in rerun.outcomes.values()), Decimal(0))
+def _read_parts(engine: RerunEngine, parts: Sequence[PartName]) -> Iterator[tuple[PartName, SourceTree]]:
+    """Yield the parts that are Python."""
+    for part in parts:
+        text = engine.get_source(part)
+        if text is not None:
+            with suppress(UsageError):
+                yield part, SourceTree(text)
 
 
-def _list_changes(engine: RerunEngine, parts: Sequence[PartName]) -> Iterator[ChangedLine]:
-    """Yield the changes of all parts, those of the operators first."""
-    texts = {part: text for part in parts if (text := engine.get_source(part)) is not None}
-    trees: dict[PartName, SourceTree] = {}
-    for part, text in texts.items():
+class _LineSearch:
+    """One search: the changes of the parts in the order in which they are tried, and the best one so far."""
+
+    def __init__(
+        self, engine: RerunEngine, criterion: str, trees: Mapping[PartName, SourceTree], reference: RunPlan | None
+    ) -> None:
+        self.best: Rerun | None = None
+        self._engine, self._criterion, self._trees, self._reference = engine, criterion, trees, reference
+        #: For each text that was tried, whether it changes a recording.
+        self._effects: dict[str, bool] = {}
+
+    def run(self, known_changes: Sequence[ChangedLine]) -> None:
+        """Try the changes until one loses nothing for any criterion. Raises BudgetSpent, HostError."""
+        for change in chain(known_changes, self._list_changes()):
+            if change.text not in self._effects:
+                self._effects[change.text] = self._try_change(change)
+            if self.best is not None and not count_lost_marks(self.best):
+                return
+
+    def _try_change(self, change: ChangedLine) -> bool:
+        """Run the trials with a change. Return whether it changes a recording."""
         try:
-            trees[part] = SourceTree(text)
-        except UsageError:
-            continue
-        yield from _list_mutants(part, text)
-    for factor in _FACTORS:
-        for part, tree in trees.items():
-            yield from _list_scaled_numbers(part, tree, factor)
+            rerun = self._engine.rerun_criterion(self._criterion, (change,))
+        except RunTooLong:
+            return True
+        is_better = self.best is None or count_lost_marks(rerun) < count_lost_marks(self.best)
+        if rerun.passes(self._criterion) and is_better:
+            self.best = rerun
+        return any(rerun.recordings[each].sha256 != rerun.originals[each].sha256 for each in rerun.trials)
+
+    def _list_changes(self) -> Iterator[ChangedLine]:
+        for part in self._trees:
+            yield from self._list_changes_by_reference(part)
+        expected = collect_expected_texts(self._engine.assignment)
+        yield from self._build_all(lambda part, tree: _list_likely_repairs(part, tree, expected))
+        mutants = chain.from_iterable(_list_mutants(part, tree, _OPERATORS) for part, tree in self._trees.items())
+        shifted = self._build_all(lambda _, tree: shift_indices(tree))
+        numbers = list_number_changes(self._engine, self._criterion, self._trees, self._has_effect)
+        pairs = zip_longest(chain(mutants, shifted), numbers)
+        yield from (each for pair in pairs for each in pair if each is not None)
+        yield from self._build_all(_list_unlikely_repairs)
+        for part, tree in self._trees.items():
+            yield from _list_mutants(part, tree, _LATE_OPERATORS)
+        yield from self._build_all(lambda _, tree: remove_statements(tree))
+
+    def _list_changes_by_reference(self, part: PartName) -> Iterator[ChangedLine]:
+        """Yield what the reference's text and output suggest for a part; nothing without a reference that has it."""
+        tree, text = self._trees[part], None if self._reference is None else self._reference.get_source(part)
+        if self._reference is None or text is None:
+            return
+        changes = list(_build_changes(part, tree, list_reference_statements(tree, SourceTree(text))))
+        if len(changes) <= _MAX_DIFFERENCES:
+            yield from changes
+        trial = self._choose_trial()
+        rerun = self._engine.rerun((trial,), (GivenPart(part, self._reference),))
+        own = self._engine.results[trial].recording
+        yield from _build_changes(part, tree, list_output_repairs(tree, own, rerun.recordings[trial]))
+
+    def _build_all(self, list_repairs: Callable[[PartName, SourceTree], Iterable[Repair]]) -> Iterator[ChangedLine]:
+        """Yield the repairs of all parts, without lines of the robot's program that the trial does not reach."""
+        for part, tree in self._trees.items():
+            reached = self._list_reached_lines() if part == "program" else frozenset()
+            for change in _build_changes(part, tree, list_repairs(part, tree)):
+                if not reached or _find_statement_line(tree, change.line) in reached:
+                    yield change
+
+    def _list_reached_lines(self) -> frozenset[int]:
+        """Return the lines that the program reaches in a failed trial; empty if they are not known."""
+        trial = self._choose_trial()
+        recording = self._engine.rerun((trial,), (RecordedLines(),)).recordings[trial]
+        return frozenset(line for each in recording.places for line in (each.line, each.outer))
+
+    def _choose_trial(self) -> int:
+        engine, criterion = self._engine, self._criterion
+        return next(iter((*engine.list_failed_trials(criterion), *engine.list_trials(criterion))))
+
+    def _has_effect(self, change: ChangedLine) -> bool:
+        return self._effects[change.text]
 
 
-def _list_mutants(part: PartName, text: str) -> Iterator[ChangedLine]:
+def count_lost_marks(rerun: Rerun) -> Decimal:
+    """Return the marks of all criteria that still lose some."""
+    return sum((each.max_marks for name, each in rerun.outcomes.items() if rerun.loses(name)), Decimal(0))
+
+
+def _list_likely_repairs(part: PartName, tree: SourceTree, expected: ExpectedTexts) -> Iterator[Repair]:
+    """Yield the repairs of common mistakes of which a program has few places."""
+    yield from use_expected_texts(tree, expected)
+    if "program" in part:
+        yield from chain(stop_motors(tree), add_waits_after_messages(tree))
+    else:
+        yield from complete_json(tree, expected)
+    yield from chain(declare_globals(tree), reread_values(tree), set_flags(tree))
+    yield from chain(exchange_operands(tree), exchange_sides(tree))
+
+
+def _list_unlikely_repairs(part: PartName, tree: SourceTree) -> Iterator[Repair]:
+    yield from move_into_and_out_of_loops(tree)
+    if "program" in part:
+        yield from add_waits(tree)
+
+
+def _list_mutants(part: PartName, tree: SourceTree, operators: frozenset[str]) -> Iterator[ChangedLine]:
+    """Yield mutants that can be what the author meant."""
     kind: Part = "program" if "program" in part else "responder"
-    mutants = [each for each in iterate_mutants(text, kind) if each.operator in _OPERATORS]
-    # The last ones can make loops endless, which is expensive.
-    for mutant in sorted(choose_mutants(mutants, _MAX_MUTANTS), key=lambda each: each.operator == "while and if"):
+    # A loop that never begins passes whatever needs only an end.
+    mutants = [
+        each
+        for each in iterate_mutants(tree.text, kind)
+        if each.operator in operators and "while False" not in each.source
+    ]
+    for mutant in choose_mutants(mutants, _MAX_MUTANTS):
         yield ChangedLine(part, mutant.line, mutant.old, mutant.new, mutant.source)
 
 
-def _list_scaled_numbers(part: PartName, tree: SourceTree, factor: float) -> Iterator[ChangedLine]:
-    for number in tree.numbers:
-        role = find_role(tree, number)
-        is_whole = isinstance(number.value, int) and role in ("index", "loop")
-        value = round(number.value * factor) if is_whole else float(f"{number.value * factor:.3g}")
-        if value == number.value:
-            continue
-        new = format_number(int(value) if float(value).is_integer() else value)
-        place = Sentence("line %(line)s of %(name)s", line=number.line, name=get_part_file(part))
-        yield ChangedLine(
-            part,
-            number.line,
-            tree.text[number.start : number.end],
-            new,
-            tree.apply(Edit(number.start, number.end, new)),
-            describe_direction(role, find_direction(number.value, value, role), place),
-        )
+def _build_changes(part: PartName, tree: SourceTree, repairs: Iterable[Repair]) -> Iterator[ChangedLine]:
+    """Yield the changes of a part that leave it Python."""
+    for repair in repairs:
+        text = tree.apply(repair.edit)
+        if text != tree.text and is_python(text):
+            old = tree.text[repair.edit.start : repair.edit.end]
+            yield ChangedLine(part, repair.line, old, repair.edit.new.strip(), text, repair.kind)
+
+
+def _find_statement_line(tree: SourceTree, line: int) -> int:
+    """Return the first line of the innermost statement at a line."""
+    statements = (each for each in tree.nodes if isinstance(each, ast.stmt))
+    return max((each.lineno for each in statements if each.lineno <= line <= (each.end_lineno or line)), default=line)

@@ -6,7 +6,7 @@ Equal reruns are run once. Nothing here is marked or stored, and the same reruns
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
@@ -16,7 +16,6 @@ from service.grading.judging.judge_declaration import StaticAnalysis
 from service.grading.judging.limited_judging import compute_judging_limits, judge_within_limits
 from service.grading.notebook_trial import NotebookTrial
 from service.grading.reruns.exchanges import (
-    SECOND_PROGRAM_PART,
     ChangedLine,
     Exchange,
     GivenPart,
@@ -28,7 +27,9 @@ from service.grading.static_analysis import analyse
 from service.grading.trial_runner import TrialRunner
 from service.grading.trial_specs import build_trial_spec
 from sim.errors import RobomarkError, UsageError
+from sim.floors import Floor
 from sim.recording import Recording
+from sim.robot import Robot, get_robot
 from submissions.assignment.definition import Assignment, Trial
 from submissions.criteria import Criterion
 from submissions.criteria.code import PythonCheck
@@ -37,8 +38,8 @@ from submissions.seeds import PUBLIC_SECRET, SeedSource
 _VISIBLE = "visible"
 #: How much dearer than the dearest run so far the next one may be.
 _SAFETY = 1.3
-#: CPU seconds of a run with a changed line.
-_MAX_CHANGED_SECONDS = 0.6
+#: CPU seconds of a run with a changed line: at least so many, and as many times those of the longest other run.
+_MIN_CHANGED_SECONDS, _MAX_CHANGED_FACTOR = 0.6, 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class RerunOutcome:
 
     ``passed`` and ``failed`` are indices of trials in the grade; ``failed_before`` are those that failed when they were
     recorded. ``is_whole`` says whether every trial that the criterion judges was run again, so that ``marks`` are those
-    of the exchange; otherwise they mix old and new trials.
+    of the exchange.
     """
 
     marks: Decimal
@@ -84,6 +85,25 @@ class RerunOutcome:
     failed: frozenset[int]
     failed_before: frozenset[int]
     is_whole: bool
+
+
+class OutcomesOnDemand(Mapping[str, RerunOutcome]):
+    """The outcomes of criteria. Each is judged when it is first needed, because most are never needed."""
+
+    def __init__(self, criteria: Sequence[str], judge: Callable[[str], RerunOutcome]) -> None:
+        self._criteria, self._judge = criteria, judge
+        self._outcomes: dict[str, RerunOutcome] = {}
+
+    def __getitem__(self, criterion: str) -> RerunOutcome:
+        if criterion not in self._outcomes:
+            self._outcomes[criterion] = self._judge(criterion)
+        return self._outcomes[criterion]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._criteria)
+
+    def __len__(self) -> int:
+        return len(self._criteria)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +178,7 @@ class RerunEngine:
             runner.check_trial_isolation()
         self._recordings: dict[tuple[int, tuple[str, ...]], Recording] = {}
         self._reruns: dict[tuple[tuple[int, ...], tuple[str, ...]], Rerun] = {}
+        self._longest_seconds = 0.0  # of one run without a changed line, for all causes
         self.start_cause(budget)
 
     def start_cause(self, budget: Budget = DEFAULT_BUDGET) -> None:
@@ -172,12 +193,21 @@ class RerunEngine:
 
     def get_source(self, part: PartName) -> str | None:
         """Return the text of a part as it runs; None if the submission does not have it as a file of its own."""
-        plan = self._plan
-        if isinstance(plan.trial, NotebookTrial):
-            return None
-        specs = {"program": plan.program, "responder": plan.responder, SECOND_PROGRAM_PART: plan.second_program}
-        spec = specs.get(part) or plan.agents.get(part)
-        return None if spec is None else spec.code.text
+        return self._plan.get_source(part)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of all trials."""
+        return get_robot(self.assignment.world.robot)
+
+    @property
+    def floor(self) -> Floor:
+        """The floor of the first trial."""
+        return build_trial_spec(next(iter(self.trials.values())), self._trial_plan).floor
+
+    def build_result(self, index: int, recording: Recording) -> TrialResult:
+        """Return the result of a trial with another recording."""
+        return replace(self.results[index], recording=recording)
 
     @property
     def spent(self) -> Spent:
@@ -249,16 +279,15 @@ class RerunEngine:
         if known_rerun is not None:
             return known_rerun
         recordings = {index: self._record(index, exchanges, keys) for index in trials}
-        start = time.process_time()
         rerun = Rerun(
             tuple(exchanges),
             {index: self.results[index].recording for index in trials},
             recordings,
-            self._judge(recordings, exchanges),
+            OutcomesOnDemand(
+                tuple(each.id for each in self.assignment.criteria if each.judges_runs),
+                lambda criterion: self._judge(criterion, recordings, exchanges),
+            ),
         )
-        judging_seconds = time.process_time() - start
-        self._cpu_seconds += judging_seconds
-        self._dearest_judging_seconds = max(self._dearest_judging_seconds, judging_seconds)
         self._reruns[tuple(trials), keys] = rerun
         return rerun
 
@@ -274,7 +303,8 @@ class RerunEngine:
         self._runs += 1
         # A changed line can make a loop endless, which must not use up the budget.
         has_changed_line = any(isinstance(each, ChangedLine) for each in exchanges)
-        limit = min(seconds_left, _MAX_CHANGED_SECONDS) if has_changed_line else seconds_left
+        changed_seconds = max(_MIN_CHANGED_SECONDS, _MAX_CHANGED_FACTOR * self._longest_seconds)
+        limit = min(seconds_left, changed_seconds) if has_changed_line else seconds_left
         cut = RunTooLong("the changed program computes for too long") if limit < seconds_left else BudgetSpent()
         start = time.process_time()
 
@@ -294,25 +324,34 @@ class RerunEngine:
             self._sleep_seconds += meter.spent.sleep_seconds
             if not has_changed_line:
                 self._dearest_seconds = max(self._dearest_seconds, seconds)
+                self._longest_seconds = max(self._longest_seconds, seconds)
         if meter.spent.cpu_seconds >= limit or meter.spent.sleep_seconds >= sleep_left:
             # The limit may have ended the trial, so its recording proves nothing.
             raise cut
         self._recordings[index, keys] = recording
         return recording
 
-    def _judge(self, recordings: Mapping[int, Recording], exchanges: Sequence[Exchange]) -> dict[str, RerunOutcome]:
-        """Judge the criteria that judge runs. Trials that may not be run again don't take part."""
-        criteria = tuple(each for each in self.assignment.criteria if each.judges_runs)
-        assignment = replace(self.assignment, criteria=criteria)
-        indices = tuple(self.results)
+    def _judge(
+        self, criterion: str, recordings: Mapping[int, Recording], exchanges: Sequence[Exchange]
+    ) -> RerunOutcome:
+        """Judge a criterion with those that it needs, in the trials that were run again.
+
+        Criteria that compare trials are judged with all others that may be run again, too.
+        """
+        start = time.process_time()
+        criteria = [each for each in self._list_needed(criterion) if each.judges_runs]
+        indices = tuple(recordings if all(each.judges_each_trial for each in criteria) else self.results)
         trials = tuple(
-            replace(result, recording=recordings[index]) if index in recordings else result
-            for index, result in self.results.items()
+            self.build_result(index, recordings.get(index, self.results[index].recording)) for index in indices
         )
-        results = judge_within_limits(
-            compute_judging_limits(trials), assignment, trials, self._analyse(trials, exchanges), self._heartbeat
-        )
-        return {result.id: self._build_outcome(result, indices, recordings) for result in results}
+        assignment = replace(self.assignment, criteria=tuple(criteria))
+        analysis = self._analyse(assignment, trials, exchanges)
+        result, *_ = judge_within_limits(compute_judging_limits(trials), assignment, trials, analysis, self._heartbeat)
+        outcome = self._build_outcome(result, indices, recordings)
+        judging_seconds = time.process_time() - start
+        self._cpu_seconds += judging_seconds
+        self._dearest_judging_seconds = max(self._dearest_judging_seconds, judging_seconds)
+        return outcome
 
     def _build_outcome(
         self, result: CriterionResult, indices: Sequence[int], recordings: Mapping[int, Recording]
@@ -327,12 +366,14 @@ class RerunEngine:
             not is_withheld and not result.unjudged and set(self.list_trials(result.id)) <= recordings.keys(),
         )
 
-    def _analyse(self, trials: Sequence[TrialResult], exchanges: Sequence[Exchange]) -> StaticAnalysis:
+    def _analyse(
+        self, assignment: Assignment, trials: Sequence[TrialResult], exchanges: Sequence[Exchange]
+    ) -> StaticAnalysis:
         """Return the data that is not in the recordings: the results of the instructor's own checks."""
         given_parts = {each.part for each in exchanges if isinstance(each, GivenPart)}
         missing = None if self._plan.missing in given_parts else self._plan.missing
-        checks = tuple(each for each in self.assignment.criteria if isinstance(each, PythonCheck))
+        checks = tuple(each for each in assignment.criteria if isinstance(each, PythonCheck))
         if not checks:
             return StaticAnalysis(flags=self._plan.flags, missing=missing)
-        plan = replace(self._plan, assignment=replace(self.assignment, criteria=checks), missing=missing)
+        plan = replace(self._plan, assignment=replace(assignment, criteria=checks), missing=missing)
         return analyse(plan, trials, self._runner, JobMeter(heartbeat=self._heartbeat))

@@ -20,6 +20,8 @@ from submissions.submission import PART_FILES, SECOND_PROGRAM
 
 RedrawnStream = Literal["light noise", "motor noise", "messages"]
 ChannelEffect = Literal["duplication", "reordering", "corruption", "jitter"]
+#: What a change does with its line: it changes the line, adds a statement or a wait after it, or removes it.
+ChangeKind = Literal["changed", "added", "wait", "removed"]
 #: A part of a submission: ``program``, ``responder``, ``second program``, or the name of an agent.
 PartName = str
 SECOND_PROGRAM_PART = "second program"
@@ -64,6 +66,17 @@ class WithoutMotorNoise:
     def apply(self, spec: TrialSpec) -> TrialSpec:
         """Return the trial with the ingredient replaced."""
         return replace(spec, noise=replace(spec.noise, motor=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedLines:
+    """Nothing is replaced, but the lines that the program reaches are recorded."""
+
+    key: str = "lines recorded"
+
+    def apply(self, spec: TrialSpec) -> TrialSpec:
+        """Return the same trial with its lines."""
+        return replace(spec, records_lines=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,7 +272,7 @@ class AnswersFrom:
 
 @dataclass(frozen=True, slots=True)
 class ChangedLine:
-    """One change in a line of a part, whose file keeps its name: ``old`` became ``new``, and ``text`` is the result.
+    """One change at a line of a part, whose file keeps its name: ``old`` became ``new``, and ``text`` is the result.
 
     ``direction`` is the sentence on a number that is too large or too small, if the change is of a number.
     """
@@ -269,6 +282,7 @@ class ChangedLine:
     old: str
     new: str
     text: str = field(repr=False)
+    kind: ChangeKind = "changed"
     direction: str = ""
 
     @property

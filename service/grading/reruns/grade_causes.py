@@ -39,7 +39,7 @@ def add_causes(
         submission: The submission.
         assignment: The assignment.
         runner: Runs the trials.
-        reference: The reference solution, if there is one. It is used only if the assignment compares halves.
+        reference: The reference solution, if there is one. It is used only if the assignment says so.
         secret: Where the seeds of the grade come from.
         reveals: How many causes in hidden trials the student may see. Staff see all.
         revealed_before: How many of them are in other grades.
@@ -56,7 +56,7 @@ def add_causes(
         return grade
     runner.start_zygotes(plan.processes)
     given_plan: RunPlan | None = None
-    if reference is not None and assignment.reruns.halves:
+    if reference is not None and assignment.reruns.uses_reference:
         given_plan = plan_reference(reference, assignment, secret)
     causes: list[Cause] = []
     visibilities = frozenset(trial.visibility for trial in grade.trials)

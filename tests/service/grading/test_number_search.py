@@ -9,13 +9,14 @@ import pytest
 
 from command import robomark
 from service.grading.grader import grade
-from service.grading.number_experiments import GradedCriterion, SearchBudget, collect_numbers
+from service.grading.number_experiments import GradedCriterion, SearchBudget, read_student_files
 from service.grading.number_roles import describe_direction, find_direction, find_role
 from service.grading.number_search import NumberSearch, find_nearest_number
 from service.grading.pools.drawing import PoolExtent
+from service.grading.program_numbers import collect_numbers
 from service.grading.trial_runner import TrialRunner
 from service.language import load_language
-from service.mutation.source_tree import Edit, SourceTree
+from service.mutation.source_tree import SourceTree
 from submissions.assignment.examples import locate_examples, read_example
 from submissions.assignment.reader import find_assignment
 from submissions.seeds import PUBLIC_SECRET
@@ -56,11 +57,11 @@ def test_the_nearest_number_passes(
     assert search.runs <= 60
     [number] = [
         each
-        for each in collect_numbers(submission, find_assignment(assignment))
+        for each in collect_numbers(read_student_files(submission, find_assignment(assignment)))
         if (each.line, each.column) == (change.line, change.column)
     ]
-    assert number.tree.text[number.start : number.end] == change.old
-    changed = submission.with_source(change.file, number.tree.apply(Edit(number.start, number.end, change.new)))
+    assert number.old == change.old
+    changed = submission.with_source(change.file, number.change_text(float(change.new)))
     graded = grade(changed, find_assignment(assignment), runner=runner)
     result = next(each for each in graded.criteria if each.id == search.criterion)
     assert (result.marks, graded.marks) == (result.max_marks, change.marks)

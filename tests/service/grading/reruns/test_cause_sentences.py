@@ -18,6 +18,7 @@ from service.grading.reruns.engine import Rerun, RerunOutcome
 from service.grading.reruns.exchanges import (
     AnswersFrom,
     ChangedLine,
+    ChangeKind,
     Exchange,
     GivenPart,
     MoreTime,
@@ -41,6 +42,12 @@ CONDITIONS: tuple[Exchange, ...] = (
     WithoutMessageLoss(),
     WithoutChannelEffect("corruption"),
 )
+LINES: dict[ChangeKind, str] = {
+    "changed": "With one change in line 8",
+    "added": "With one more statement after line 8",
+    "wait": "With a wait after line 8",
+    "removed": "Without the statement in line 8",
+}
 WORDS = {
     "the light noise off": WithoutLightNoise(),
     "the motor noise off": WithoutMotorNoise(),
@@ -109,7 +116,13 @@ CAUSES: dict[CauseKind, st.SearchStrategy[tuple[Rerun, ...]]] = {
         reruns(st.builds(lambda numbers: (WithoutMessageLoss(numbers),), st.frozensets(st.integers(1, 9), min_size=1))),
     ),
     "chance": st.builds(tuple, st.lists(reruns(st.just((OtherNoise(1),))), min_size=1, max_size=5)),
-    "line": st.tuples(reruns(st.just((ChangedLine("program", 8, "<", ">", "", "It is too short."),)))),
+    "line": st.tuples(
+        reruns(
+            st.sampled_from(list(LINES)).map(
+                lambda kind: (ChangedLine("program", 8, "<", ">", "", kind, "It is too short."),)
+            )
+        )
+    ),
     "time": st.tuples(reruns(st.just((MoreTime(),)))),
     "start": st.tuples(reruns(st.just((VisibleStart(Pose(1, 2, 3), 0),)))),
     "mildest": mildest(),
@@ -256,7 +269,9 @@ def check_claims(text: str, cause: Cause) -> None:
             assert numbers == [str(len(cause.reruns)), str(sum(map(passes, cause.reruns)))]
         case "line":
             check_result(text.removesuffix(" It is too short."), cause.reruns[0])
-            assert text.startswith("With one change in line 8 of robot.py, the same submission ")
+            (change,) = cause.reruns[0].exchanges
+            assert isinstance(change, ChangedLine)
+            assert text.startswith(f"{LINES[change.kind]} of robot.py, the same submission ")
         case "time":
             check_result(text, cause.reruns[0])
             assert "With 2 times the simulated time" in text

@@ -43,8 +43,12 @@ def exchanged(submission: Submission, **replacements: tuple[str, str]) -> Submis
 
 
 def explain(runner: TrialRunner, name: str, submission: Submission) -> Grade:
+    """Return the grade with causes. Only runs are limited, because the speed of the machine must not matter."""
     assignment, reference = read(name)
-    return add_causes(grade(submission, assignment, runner=runner), submission, assignment, runner, reference=reference)
+    graded = grade(submission, assignment, runner=runner)
+    return add_causes(
+        graded, submission, assignment, runner, reference=reference, budget=Budget(cpu_seconds=1e9, sleep_seconds=1e9)
+    )
 
 
 def explained(runner: TrialRunner, name: str, **replacements: tuple[str, str]) -> dict[str, str]:
@@ -170,12 +174,13 @@ def test_line_of_a_wrong_number_is_named_and_staff_see_the_change(runner: TrialR
     number = next(each for each in SourceTree(reference.program.text).numbers if each.value == 1.6)
     text = f"{reference.program.text[: number.start]}2.4{reference.program.text[number.end :]}"
     submission = replace(reference, program=SourceFile("robot.py", text))
-    graded = add_causes(grade(submission, assignment, runner=runner), submission, assignment, runner)
+    graded = grade(submission, assignment, runner=runner)
+    graded = add_causes(graded, submission, assignment, runner, budget=Budget(cpu_seconds=1e9))
     (cause, *_) = graded.causes
     assert cause.text.startswith(f"With one change in line {number.line} of robot.py, the same submission gets")
     assert cause.text.endswith(f"The turn at line {number.line} of robot.py is too long.")
     assert cause.next_step == f"Check line {number.line} of robot.py, then submit again."
-    assert cause.staff_note == f"For staff: in line {number.line}, 2.4 became 1.6."
+    assert cause.staff_note.startswith(f"For staff: in line {number.line}, 2.4 became 1.6")
 
 
 def test_parts_of_the_student() -> None:
