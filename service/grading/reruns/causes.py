@@ -28,6 +28,7 @@ from service.grading.reruns.halves import (
     decide_losing_parts,
     find_losing_answer,
     find_losing_parts,
+    list_part_reruns,
     list_student_parts,
 )
 from service.grading.reruns.mildest import Conditions, find_mildest_failure, get_conditions, remove_conditions
@@ -178,7 +179,8 @@ def _add_line(
     still lose marks beside the reference's, because it shows that one of them is enough.
     """
     parts = [part for cause in part_causes for part in decide_losing_parts(cause.reruns, criterion)]
-    if len(parts) > 1 and any(rerun.passes(criterion) for cause in part_causes for rerun in cause.reruns):
+    single = [rerun for cause in part_causes for given, rerun in list_part_reruns(cause.reruns) if len(given) == 1]
+    if len(parts) > 1 and any(rerun.passes(criterion) for rerun in single):
         return part_causes
     given = reference if engine.assignment.reruns.statements and engine.has_exchangeable_parts else None
     student_parts = list_student_parts(engine.assignment)

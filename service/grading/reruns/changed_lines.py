@@ -6,7 +6,7 @@ The changes are tried one after the other, the likely ones first, until the budg
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 from itertools import chain, zip_longest
@@ -145,15 +145,15 @@ class _LineSearch:
         yield from _build_changes(part, tree, list_output_repairs(tree, own, rerun.recordings[trial]))
 
     def _build_all(self, list_repairs: Callable[[PartName, SourceTree], Iterable[Repair]]) -> Iterator[ChangedLine]:
-        """Yield the repairs of all parts, without lines of the robot's program that the trial does not reach."""
+        """Yield the repairs of all parts, without those in blocks of the program that the trial does not reach."""
         for part, tree in self._trees.items():
-            reached = self._list_reached_lines() if part == "program" else frozenset()
+            lines = self._list_lines_with_calls() if part == "program" else frozenset()
             for change in _build_changes(part, tree, list_repairs(part, tree)):
-                if not reached or _find_statement_line(tree, change.line) in reached:
+                if not lines or _is_block_reached(tree, change.line, lines):
                     yield change
 
-    def _list_reached_lines(self) -> frozenset[int]:
-        """Return the lines that the program reaches in a failed trial; empty if they are not known."""
+    def _list_lines_with_calls(self) -> frozenset[int]:
+        """Return the lines from which the program calls its robot in a failed trial; empty if they are not known."""
         trial = self._choose_trial()
         recording = self._engine.rerun((trial,), (RecordedLines(),)).recordings[trial]
         return frozenset(line for each in recording.places for line in (each.line, each.outer))
@@ -210,7 +210,14 @@ def _build_changes(part: PartName, tree: SourceTree, repairs: Iterable[Repair]) 
             yield ChangedLine(part, repair.line, old, repair.edit.new.strip(), text, repair.kind)
 
 
-def _find_statement_line(tree: SourceTree, line: int) -> int:
-    """Return the first line of the innermost statement at a line."""
-    statements = (each for each in tree.nodes if isinstance(each, ast.stmt))
-    return max((each.lineno for each in statements if each.lineno <= line <= (each.end_lineno or line)), default=line)
+def _is_block_reached(tree: SourceTree, line: int, lines_with_calls: Collection[int]) -> bool:
+    """Return whether the block with the statement at a line can be reached: it has such a line, or is a function's."""
+    statements = [each for each in tree.nodes if isinstance(each, ast.stmt)]
+    inside = [each for each in statements if each.lineno <= line <= (each.end_lineno or line)]
+    if not inside:
+        return True
+    statement = max(inside, key=lambda each: (each.lineno, each.col_offset))
+    block = next((each for each in tree.iterate_ancestors(statement) if isinstance(each, ast.stmt)), None)
+    if block is None or isinstance(block, ast.FunctionDef):
+        return True
+    return any(block.lineno <= each <= (block.end_lineno or each) for each in lines_with_calls)
