@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from responders import message_format
 from service.grading.answer_guesses import collect_guesses
 from service.grading.reruns.repairs import Repair, replace_node
-from service.mutation.operators import is_documentation, list_texts
+from service.mutation.operators import is_documentation, is_index, list_texts
 from service.mutation.source_tree import SourceTree, get_called_name, get_text
 from submissions.assignment.definition import Assignment
 
@@ -77,6 +77,26 @@ def _replace_keys(tree: SourceTree, expected: ExpectedTexts) -> Iterator[Repair]
                 yield from (replace_node(tree, key_node, repr(key)) for key in missing)
         if missing:
             yield replace_node(tree, node, f"{{{missing[0]!r}: {tree.cut(node)}}}")
+
+
+def collect_keys(tree: SourceTree) -> tuple[str, ...]:
+    """Return the texts that a part uses as keys, in the order of the text."""
+    return tuple(dict.fromkeys(str(get_text(node)) for node in _list_keys(tree)))
+
+
+def use_other_keys(tree: SourceTree, other_keys: Sequence[str]) -> Iterator[Repair]:
+    """Yield each key that no other part of the submission has, as each one that only the others have."""
+    missing = [key for key in other_keys if key not in collect_keys(tree)]
+    for node in _list_keys(tree):
+        if get_text(node) not in other_keys:
+            yield from (replace_node(tree, node, repr(key)) for key in missing)
+
+
+def _list_keys(tree: SourceTree) -> list[ast.expr]:
+    """Return the texts that are keys of dictionaries or indices."""
+    dictionaries = [key for node in tree.nodes if isinstance(node, ast.Dict) for key in node.keys if key is not None]
+    indices = [node for node in tree.nodes if isinstance(node, ast.Constant) and is_index(tree, node)]
+    return [each for each in (*dictionaries, *indices) if get_text(each)]
 
 
 def use_expected_texts(tree: SourceTree, expected: ExpectedTexts) -> Iterator[Repair]:

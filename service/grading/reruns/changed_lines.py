@@ -14,12 +14,15 @@ from itertools import chain, zip_longest
 from service.grading.reruns.answer_repairs import (
     ExpectedTexts,
     collect_expected_texts,
+    collect_keys,
     complete_json,
     use_expected_texts,
+    use_other_keys,
 )
 from service.grading.reruns.changed_numbers import list_number_changes
 from service.grading.reruns.engine import BudgetSpent, Rerun, RerunEngine, RunTooLong
 from service.grading.reruns.exchanges import ChangedLine, GivenPart, PartName, RecordedLines
+from service.grading.reruns.halves import list_student_parts
 from service.grading.reruns.output_repairs import list_output_repairs
 from service.grading.reruns.reference_statements import list_reference_statements
 from service.grading.reruns.repairs import (
@@ -32,6 +35,7 @@ from service.grading.reruns.repairs import (
     move_into_and_out_of_loops,
     remove_statements,
     reread_values,
+    return_values,
     set_flags,
     shift_indices,
     stop_motors,
@@ -121,6 +125,7 @@ class _LineSearch:
             yield from self._list_changes_by_reference(part)
         expected = collect_expected_texts(self._engine.assignment)
         yield from self._build_all(lambda part, tree: _list_likely_repairs(part, tree, expected))
+        yield from self._build_all(lambda part, tree: use_other_keys(tree, self._collect_other_keys(part)))
         mutants = chain.from_iterable(_list_mutants(part, tree, _OPERATORS) for part, tree in self._trees.items())
         shifted = self._build_all(lambda _, tree: shift_indices(tree))
         numbers = list_number_changes(self._engine, self._criterion, self._trees, self._has_effect)
@@ -130,6 +135,11 @@ class _LineSearch:
         for part, tree in self._trees.items():
             yield from _list_mutants(part, tree, _LATE_OPERATORS)
         yield from self._build_all(lambda _, tree: remove_statements(tree))
+
+    def _collect_other_keys(self, part: PartName) -> list[str]:
+        """Return the keys of the other parts that students write."""
+        others = [each for each in list_student_parts(self._engine.assignment) if each != part]
+        return [key for _, tree in _read_parts(self._engine, others) for key in collect_keys(tree)]
 
     def _list_changes_by_reference(self, part: PartName) -> Iterator[ChangedLine]:
         """Yield what the reference's text and output suggest for a part; nothing without a reference that has it."""
@@ -177,7 +187,7 @@ def _list_likely_repairs(part: PartName, tree: SourceTree, expected: ExpectedTex
     if "program" in part:
         yield from chain(stop_motors(tree), add_waits_after_messages(tree))
     else:
-        yield from complete_json(tree, expected)
+        yield from chain(return_values(tree), complete_json(tree, expected))
     yield from chain(declare_globals(tree), reread_values(tree), set_flags(tree))
     yield from chain(exchange_operands(tree), exchange_sides(tree))
 

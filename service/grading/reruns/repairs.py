@@ -105,6 +105,18 @@ def declare_globals(tree: SourceTree) -> Iterator[Repair]:
         yield from (add_first(tree, function.body, f"global {name}") for name in sorted(names))
 
 
+def return_values(tree: SourceTree) -> Iterator[Repair]:
+    """Yield a return of each value that a function prints, and of the name that its last statement assigns."""
+    for function in (each for each in tree.nodes if isinstance(each, ast.FunctionDef)):
+        for node in ast.walk(function):
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) and _is_output(node) and node.value.args:
+                edit = tree.replace(node, f"return {tree.cut(node.value.args[0])}")
+                yield Repair(edit, tree.find_line(edit.start))
+        last = function.body[-1]
+        if isinstance(last, ast.Assign) and isinstance(last.targets[0], ast.Name):
+            yield add_after(tree, last, f"return {last.targets[0].id}")
+
+
 def exchange_sides(tree: SourceTree) -> Iterator[Repair]:
     """Yield each name, attribute and text with left or right for the other side, if the text has that one too."""
     for node in tree.nodes:
