@@ -206,6 +206,10 @@ class ServerEngine:
             )
         if response.status_code == 403:
             raise EngineError(f"{detail} Create one with the scopes read and submit on {self.url}/account.")
+        assignment = response.request.url.params.get("assignment")
+        if response.status_code == 404 and assignment:
+            course = f"{self.url}/courses/{self._course_id}/mine"
+            raise EngineError(f"Your course has no open assignment {assignment}. Its assignments are on {course}.")
         if detail.startswith("page"):
             raise EngineError(
                 f"The server cannot read the state of the simulator ({detail}). Restart the kernel and run the cell "
