@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from service.search_text import fold_text
 from service.store.batches.job_lines import match_standing_jobs
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import current_grades, overrides
@@ -95,14 +96,14 @@ class ReviewCounts:
 
 
 def _build_student_key(line: TableLine) -> tuple[Any, ...]:
-    return (line.student.casefold(), line.assignment, line.id)
+    return (fold_text(line.student), line.assignment, line.id)
 
 
 #: Sort keys, by the name of the order.
 SORTS: Mapping[str, Callable[[TableLine], Any]] = MappingProxyType(
     {
         "student": _build_student_key,
-        "name": lambda line: line.name.casefold(),
+        "name": lambda line: fold_text(line.name),
         "assignment": lambda line: line.assignment,
         "marks": lambda line: line.share,
         "state": lambda line: (STATES.index(line.state), line.verdict or ""),
@@ -156,7 +157,7 @@ def load_table_lines(
 
 def build_table_page(lines: Sequence[TableLine], request: TableRequest) -> TablePage:
     """Return the requested page of the matching rows, or the last page if there are fewer."""
-    text = request.text.strip().casefold()
+    text = fold_text(request.text.strip())
     matching_lines = [
         line
         for line in lines
@@ -256,4 +257,4 @@ def _build_rejected_line(refusal: RejectedSubmission) -> TableLine:
 
 
 def _build_search_text(line: TableLine) -> str:
-    return " ".join((line.student, line.name, line.source, line.assignment, line.verdict or "")).casefold()
+    return fold_text(" ".join((line.student, line.name, line.source, line.assignment, line.verdict or "")))

@@ -18,11 +18,12 @@ def test_students_are_let_in_and_get_more_time(web: Web, grace: TestClient) -> N
     path = f"{HOME}/people"
     table = {"file": ("class.csv", b"id,name,email\nada,Ada Lovelace,ada@example.org\nbob,Bob,\n")}
     assert submit(grace, f"{path}/table", files=table).status_code == 303
-    own = submit(grace, path, {"who": "cid", "name": "Cid"}).headers["location"]
+    own = submit(grace, path, {"who": "cid", "name": "Cíd"}).headers["location"]
     page_text = words(grace.get(path).text)
-    for each in ("ada Ada Lovelace ada@example.org student", "bob Bob", "cid Cid", "grace Grace instructor"):
+    for each in ("ada Ada Lovelace ada@example.org student", "bob Bob", "cid Cíd", "grace Grace instructor"):
         assert each in page_text
     assert "ada@" not in words(grace.get(f"{path}?q=cid").text)
+    assert "cid Cíd" in words(grace.get(f"{path}?q=cid cid").text)
     submit(grace, f"{own}/extensions", {"due": "2030-01-02", "more_attempts": "2"})
     assert "2 additional attempts" in words(grace.get(own).text)
     with web.store.reading() as session:
