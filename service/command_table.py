@@ -122,6 +122,7 @@ COMMANDS: Mapping[str, Command | CommandGroup] = MappingProxyType(
             "Manage courses: policies, students, assignments.",
             {
                 "list": Command("course:list_courses", "List the courses."),
+                "gradebook": Command("gradebook:gradebook", "Show the grades of a course that count."),
                 "policy": Command("course:policy", "Set or show deadline and attempts."),
                 "extend": Command("course:extend", "Allow one student more time or attempts."),
                 "enrol": Command("course:enrol", "Enrol students before they submit."),

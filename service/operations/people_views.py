@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import require_course, require_student
-from service.search_text import fold_text
 from service.store.courses import open_assignments, policies
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import ExtensionLine
@@ -67,8 +66,7 @@ def search_members(service: Service, actor: Actor, course_id: int, text: str = "
         members = membership.list_members(session, course_id)
         extended_ids = frozenset(each.enrolment_id for each in policies.list_extensions(session, course_id))
         platform = lti.find_course_link(session, course_id)
-    search_text = fold_text(text.strip())
-    matching_members = [each for each in members if search_text in fold_text(f"{each.id} {each.name} {each.email}")]
+    matching_members = [each for each in members if each.matches(text)]
     pages = max(1, -(-len(matching_members) // _PAGE_SIZE))
     number = min(number, pages)
     return MemberPage(

@@ -11,6 +11,7 @@ from functools import cache
 from sqlalchemy import ColumnElement, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
+from service.search_text import fold_text
 from service.store.engine import now
 from service.store.people import revocation
 from service.store.people.students import Students, ensure_course
@@ -34,6 +35,10 @@ class Member:
     email: str
     role: Role
     operator: bool
+
+    def matches(self, text: str) -> bool:
+        """Return whether the id, the name or the address contains a text, without regard to case and accents."""
+        return fold_text(text.strip()) in fold_text(f"{self.id} {self.name} {self.email}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,12 +164,12 @@ def list_members(session: Session, course_id: int) -> list[Member]:
     return [_build_member(enrolment, person) for enrolment, person in session.execute(query)]
 
 
-def list_members_after(session: Session, course_id: int, enrolment_id: int, limit: int) -> list[Member]:
-    """Return at most ``limit`` members of the course who were enrolled after this enrolment."""
+def list_members_after(session: Session, course_id: int, enrolment_id: int, limit: int, *roles: Role) -> list[Member]:
+    """Return at most ``limit`` members of the course, with one of these roles, enrolled after this enrolment."""
     query = (
         select(Enrolment, Person)
         .join(Person, Enrolment.person_id == Person.id)
-        .where(Enrolment.course_id == course_id, Enrolment.id > enrolment_id)
+        .where(Enrolment.course_id == course_id, Enrolment.id > enrolment_id, Enrolment.role.in_(roles or tuple(Role)))
         .order_by(Enrolment.id)
         .limit(limit)
     )

@@ -38,7 +38,7 @@ from service.web.rendering import render_page
 from sim.recording import Verdict
 
 router = APIRouter(prefix="/courses/{course_id}/batches/{batch_id}")
-_STATES = {
+STATE_LABELS = {
     "queued": translatable("queued"),
     "running": translatable("running"),
     "done": translatable("graded"),
@@ -276,7 +276,7 @@ def _build_progress_context(access: ReaderInCourse, view: BatchView) -> dict[str
         "is_unfinished": progress.ended < progress.jobs,
         "path": f"/courses/{access.course_id}/batches/{line.id}",
         "counts": _count_states(line),
-        "states": _STATES,
+        "states": STATE_LABELS,
         "BatchState": BatchState,
     }
 

@@ -95,6 +95,7 @@ SHOWING = {
     "appeals list": "appeals",
     "appeals answer 1 yes": "appeal",
     "course list": "courses",
+    "course gradebook": "assignments students",
     "course hide-names echo-responder": "assignment names_hidden",
     "course show-names echo-responder": "assignment names_hidden",
     "course policy": "policies counted_attempt completion_rule",

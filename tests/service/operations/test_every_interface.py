@@ -47,6 +47,7 @@ ELSEWHERE = {
     "credentials.make_token": "the page of one's own account; test_credential_rights.py",
     "credentials.end_credential": "the page of one's own account; test_credential_rights.py",
     "credentials.end_other_credentials": "the page of one's own account; test_credential_rights.py",
+    "gradebook.download_table": "reads; test_gradebook.py",
     "notebook_runs.start_run": "the API, for notebooks; test_notebook_runs.py",
     "notebook_runs.start_check": "the API, for notebooks; test_notebook_runs.py",
     "people.enrol_new": "the page of one student; programs send a list",
