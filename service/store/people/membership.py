@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from sqlalchemy import ColumnElement, exists, func, or_, select, update
+from sqlalchemy import ColumnElement, Select, exists, func, or_, select, update
 from sqlalchemy.orm import Session, aliased
 
 from service.search_text import fold_text
@@ -155,25 +155,19 @@ def find_course(session: Session, name: str) -> int:
 
 def list_members(session: Session, course_id: int) -> list[Member]:
     """Return all members of the course, ordered by id."""
-    query = (
-        select(Enrolment, Person)
-        .join(Person, Enrolment.person_id == Person.id)
-        .where(Enrolment.course_id == course_id)
-        .order_by(Enrolment.student)
-    )
-    return [_build_member(enrolment, person) for enrolment, person in session.execute(query)]
+    query = _select_members().where(Enrolment.course_id == course_id).order_by(Enrolment.student)
+    return [Member(*row) for row in session.execute(query)]
 
 
 def list_members_after(session: Session, course_id: int, enrolment_id: int, limit: int, *roles: Role) -> list[Member]:
     """Return at most ``limit`` members of the course, with one of these roles, enrolled after this enrolment."""
     query = (
-        select(Enrolment, Person)
-        .join(Person, Enrolment.person_id == Person.id)
+        _select_members()
         .where(Enrolment.course_id == course_id, Enrolment.id > enrolment_id, Enrolment.role.in_(roles or tuple(Role)))
         .order_by(Enrolment.id)
         .limit(limit)
     )
-    return [_build_member(enrolment, person) for enrolment, person in session.execute(query)]
+    return [Member(*row) for row in session.execute(query)]
 
 
 def list_students(session: Session, course_id: int) -> list[tuple[Member, bool]]:
@@ -224,6 +218,20 @@ def _enrol_member(session: Session, course: str, student: Student, role: Role) -
 
 def _load_member_by_id(session: Session, enrolment_id: int) -> Member:
     return load_enrolled_member(session, session.get_one(Enrolment, enrolment_id))
+
+
+def _select_members() -> Select[int, int, int, str, str, str, Role, bool]:
+    """Return the query for the fields of members. It reads no whole rows, because a course has many members."""
+    return select(
+        Person.id,
+        Enrolment.id,
+        Enrolment.course_id,
+        Enrolment.student,
+        Enrolment.name,
+        Enrolment.email,
+        Enrolment.role,
+        Person.operator,
+    ).join(Person, Enrolment.person_id == Person.id)
 
 
 def _build_member(enrolment: Enrolment, person: Person) -> Member:
