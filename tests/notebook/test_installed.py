@@ -18,7 +18,7 @@ TUTORIAL = ROOT / "docs" / "notebook.ipynb"
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> JupyterEnvironment:
-    return create_environment(tmp_path_factory.mktemp("jupyter"), "nbconvert")
+    return create_environment(tmp_path_factory.mktemp("jupyter"), "nbconvert", "ipykernel")
 
 
 def convert(environment: JupyterEnvironment, folder: Path, *words: str) -> None:
