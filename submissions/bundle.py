@@ -112,7 +112,10 @@ def _assemble_submission(raw: RawFiles, source_name: str, name: str, candidate: 
     compiled_files = [each for each, data in files.items() if is_compiled(each, data)]
     for file in compiled_files:
         del files[file]
-        notes.append(f"{sanitise_name(file)} was left out: it is compiled code; submit its Python source.")
+        notes.append(
+            f"{sanitise_name(file)} was left out: it is compiled code, or an archive with too many files; "
+            "submit Python source."
+        )
     if compiled_files and not files:
         raise UsageError(
             "%(where)s: has only %(names)s in it, which is not Python source, expected robot.py and responder.py.",

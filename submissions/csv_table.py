@@ -13,7 +13,7 @@ from sim.errors import UsageError
 from sim.readers.csv_text import CsvRecord, read_records
 from sim.readers.reader_errors import UnreadableDataError
 
-_MAX_BYTES = 10_000_000
+_MAX_BYTES, _MAX_LINES = 10_000_000, 200_000
 _SEPARATORS = (",", ";", "\t")
 #: Maximum number of lines of the header row.
 _MAX_HEADING_LENGTH = 20
@@ -80,6 +80,8 @@ def _read_text(path: Path) -> str:
         raise UsageError(f"{path.name}: line {line} is not UTF-8; save it as CSV UTF-8.") from None
     # Only these characters end a CSV line. splitlines() accepts more, which would give wrong line numbers.
     text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if text.count("\n") > _MAX_LINES:
+        raise UsageError(f"{path.name}: has more than {_MAX_LINES} lines, expected a list of students.")
     return text.translate({ord(character): " " for character in "\v\f\x1c\x1d\x1e\x85\u2028\u2029"})
 
 

@@ -125,7 +125,8 @@ def _read_claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
     client_id = pending.platform.client_id
     claims = _decode_token(pending.platform, id_token)
     audience = claims["aud"]
-    if isinstance(audience, list) and len(audience) > 1 and claims.get("azp") != client_id:
+    has_other_audiences = isinstance(audience, list) and len(audience) > 1
+    if claims.get("azp", None if has_other_audiences else client_id) != client_id:
         raise UsageError("the platform's token is for another tool")
     if claims["nonce"] != pending.nonce:
         raise UsageError("this launch was already used or started elsewhere; open the link in the course again")

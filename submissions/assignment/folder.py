@@ -29,6 +29,17 @@ def locate_assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         UsageError: Neither exists.
     """
     name = os.fspath(name_or_path)
+    try:
+        folder = _find_folder(name)
+    except OSError:  # the name is too long for a file, for example
+        folder = None
+    if folder is not None:
+        return folder
+    hint = suggest_name(name, list_catalogue_ids()) or "; robomark assignments list shows the catalogue"
+    raise UsageError(f"There is no assignment {name[:200]!r}, expected an id of the catalogue or a folder{hint}")
+
+
+def _find_folder(name: str) -> Path | None:
     path = Path(name)
     catalogue_folder = _locate_catalogue() / name
     if path.name == name and (catalogue_folder / FILE_NAME).is_file():
@@ -39,8 +50,7 @@ def locate_assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
         return path
     if path.is_file():
         raise UsageError(f"{name} is a file, expected an id of the catalogue or a folder with {FILE_NAME} in it")
-    hint = suggest_name(name, list_catalogue_ids()) or "; robomark assignments list shows the catalogue"
-    raise UsageError(f"There is no assignment {name!r}, expected an id of the catalogue or a folder{hint}")
+    return None
 
 
 def _locate_catalogue() -> Path:

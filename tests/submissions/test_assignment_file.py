@@ -396,6 +396,12 @@ def test_what_is_no_assignment_is_refused(tmp_path: Path) -> None:
         read_assignment(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["no-such", "a" * 300, "/" + "a" * 300, "../lollipop"])
+def test_a_name_of_no_assignment_is_one_sentence(name: str) -> None:
+    with pytest.raises(UsageError, match=r"^There is no assignment"):
+        locate_assignment_folder(name)
+
+
 def test_assignment_is_found_by_id_and_by_path(tmp_path: Path) -> None:
     folder = written(tmp_path / "mine", HEAD + SCENARIO + FINISHES)
     assert find_assignment(folder).id == "a"

@@ -139,6 +139,7 @@ def test_an_open_quotation_mark_costs_one_row(folder: Path) -> None:
         ("student,file\nZoë,a\n".encode("utf-16"), "not UTF-8"),
         ("student,file\nada,a\nZoë,b\n".encode("cp1252"), "line 3 is not UTF-8"),
         ('"student,file\nada,a\n', "line 1 has quotation marks"),
+        ("student,file\n" + "a,a\n" * 200_000, "more than 200000 lines"),
     ],
 )
 def test_what_is_no_roster_is_refused_in_one_sentence(folder: Path, text: str | bytes, expected: str) -> None:

@@ -249,6 +249,12 @@ def test_patterns_are_tried_on_what_is_no_text() -> None:
     assert not has_match("a" * 60_000 + "!", check_pattern(r"^(\w+\s?)+$"), False)
 
 
+def test_a_pattern_that_repeats_too_much_is_refused() -> None:
+    assert check_pattern(r"\w{40}")
+    with pytest.raises(ValueError, match="repeats too much"):
+        check_pattern(r"\w{300}")
+
+
 @pytest.mark.parametrize("part", ["[", "[^", "[x", r"[\\"])
 def test_a_class_without_an_end_is_searched_for_once(part: str) -> None:
     pattern = part * 100_000

@@ -120,6 +120,8 @@ _NOW = int(time.time())
     [
         pytest.param({"aud": "somebody else"}, {}, "token is invalid", id="for another client"),
         pytest.param({"aud": [CLIENT, "other"], "azp": "other"}, {}, "another tool", id="for another party"),
+        pytest.param({"azp": "other"}, {}, "another tool", id="for us, presented by another party"),
+        pytest.param({"aud": [CLIENT, "other"]}, {}, "another tool", id="for several, presented by nobody"),
         pytest.param({"iss": "https://evil.example.org"}, {}, "token is invalid", id="of another issuer"),
         pytest.param({"exp": _NOW - 3600, "iat": _NOW - 7200}, {}, "token is invalid", id="expired"),
         pytest.param({"nonce": "another"}, {}, "already used", id="another nonce"),

@@ -12,6 +12,7 @@ import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 import pytest
 from fastapi.routing import iter_route_contexts
@@ -26,6 +27,7 @@ from nameless_world import (
     rename_students,
 )
 from naming import is_named
+from service.operations import moderation
 from service.reports.formats import FORMATS
 from service.store.courses.hidden_names import HiddenNames
 from web import Web, web_in
@@ -34,9 +36,12 @@ API = "/api/v1"
 _COURSE = "/courses/{course_id}"
 _BATCH = f"{_COURSE}/batches/{{batch_id}}"
 _EVERYBODY = (*STUDENTS, IDLE)
-#: Membership of a course is no secret. These routes show it, and nothing about a named student's submissions.
+#: Membership of a course is no secret. These routes show it, and nothing about a student's submissions to assignments
+#: with hidden names.
 _WITH_NAMES = {f"{start}{_COURSE}/people{rest}" for start in ("", API) for rest in ("", "/{enrolment_id}")} | {
-    f"{API}{_COURSE}/people/{{enrolment_id}}/data"
+    f"{API}{_COURSE}/people/{{enrolment_id}}/data",
+    *(f"{_COURSE}/gradebook{rest}" for rest in ("", "/table")),
+    f"{API}{_COURSE}/gradebook",
 }
 #: Routes without data about students.
 _OF_NO_STUDENT = {
@@ -87,6 +92,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Answers]:
             return labels[student] if assignment in names.assignments else student
 
         patch.setattr(HiddenNames, "label_student", called)
+        # Moderation sheets show when they were made.
+        patch.setattr(moderation, "now", lambda _session: datetime(2026, 11, 27, tzinfo=UTC))
         page_reader = _PageReader(web, course)
         before = page_reader.everything()
         renamed = dict(zip(_EVERYBODY, reversed(_EVERYBODY), strict=True))
