@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import shutil
@@ -21,8 +22,9 @@ import pytest
 from notebook_builder import document
 from notebook_package import build_wheel
 
-_INSTALL_SECONDS, _START_SECONDS, _END_SECONDS = 900, 90, 20
+_INSTALL_SECONDS, _START_SECONDS, _END_SECONDS = 600, 90, 20
 _TOKEN = "a-token-of-the-tests"
+_JUPYTER = ("jupyterlab>=4", "notebook>=7", "nbconvert", "ipykernel")
 #: A responder, a run that ends with a fault, and a check.
 CELLS = [
     "%load_ext robomark_notebook",
@@ -70,22 +72,37 @@ class JupyterEnvironment:
         )
 
 
-def create_environment(folder: Path, *packages: str) -> JupyterEnvironment:
-    """Return a new environment with the wheel and its extra. The test is skipped where packages cannot be had."""
-    wheel = build_wheel(folder)
-    subprocess.run([find_python(), "-m", "venv", folder / "venv"], check=True, capture_output=True)
-    environment = JupyterEnvironment(folder / "venv")
-    install = [str(environment.python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    done = subprocess.run(
-        [*install, f"{wheel}[kit]", *packages],
-        capture_output=True,
-        text=True,
-        timeout=_INSTALL_SECONDS,
-        check=False,
-    )
-    if done.returncode:
-        pytest.skip(f"the packages cannot be installed here: {done.stderr.strip()[-300:]}")
+def share_environment(temporary: Path) -> JupyterEnvironment:
+    """Return an environment with the wheel, its extra and Jupyter, which all processes of the tests share.
+
+    Args:
+        temporary: The temporary folder of this process. Those of a parallel run are in one folder.
+
+    The test is skipped where packages cannot be had.
+    """
+    shared = temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary
+    environment = JupyterEnvironment(shared / "jupyter-environment")
+    outcome = shared / "jupyter-environment.txt"
+    with (shared / "jupyter-environment.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not outcome.exists():
+            outcome.write_text(_install(environment, temporary))
+    if problem := outcome.read_text():
+        pytest.skip(f"the packages cannot be installed here: {problem}")
     return environment
+
+
+def _install(environment: JupyterEnvironment, folder: Path) -> str:
+    """Make the environment. Return why its packages cannot be installed; empty if they can."""
+    wheel = build_wheel(folder)
+    subprocess.run([find_python(), "-m", "venv", environment.folder], check=True, capture_output=True)
+    install = [str(environment.python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    command = [*install, f"{wheel}[kit]", *_JUPYTER]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_INSTALL_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        return f"it takes more than {_INSTALL_SECONDS} s"
+    return done.stderr.strip()[-300:] if done.returncode else ""
 
 
 def build_variables(folder: Path, **variables: str) -> dict[str, str]:

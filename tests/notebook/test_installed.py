@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from jupyter_environment import FAULT, JupyterEnvironment, create_environment, write_task
+from jupyter_environment import FAULT, JupyterEnvironment, share_environment, write_task
 from paths import ROOT
 
 pytestmark = pytest.mark.long
@@ -18,7 +18,7 @@ TUTORIAL = ROOT / "docs" / "notebook.ipynb"
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> JupyterEnvironment:
-    return create_environment(tmp_path_factory.mktemp("jupyter"), "nbconvert", "ipykernel")
+    return share_environment(tmp_path_factory.getbasetemp())
 
 
 def convert(environment: JupyterEnvironment, folder: Path, *words: str) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,17 +15,18 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, ViewportSize, expect
 
 from browsing import chromium
-from jupyter_environment import FAULT, JupyterEnvironment, create_environment, serving_jupyter, write_task
+from jupyter_environment import FAULT, JupyterEnvironment, serving_jupyter, share_environment, write_task
 
 pytestmark = pytest.mark.long
 
+_RUN_SECONDS = 120
 PICTURES = os.environ.get("ROBOMARK_PICTURES")
 DESKTOP: ViewportSize = {"width": 1280, "height": 1600}
 
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> JupyterEnvironment:
-    return create_environment(tmp_path_factory.mktemp("jupyter"), "jupyterlab>=4", "notebook>=7")
+    return share_environment(tmp_path_factory.getbasetemp())
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +64,9 @@ def run_all_cells(page: Page) -> None:
     page.wait_for_selector(".jp-Notebook .jp-Cell", timeout=60_000)
     page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status='idle']", timeout=60_000)
     # The page forgets what it was to run when it gets to know its kernel.
-    first_prompt = page.locator(".jp-InputPrompt").first
+    first_prompt, end = page.locator(".jp-InputPrompt").first, time.monotonic() + _RUN_SECONDS
     while not re.fullmatch(r"\[\d+\]:", prompt := first_prompt.inner_text()):
+        assert time.monotonic() < end, prompt
         if prompt == "[ ]:":
             page.get_by_role("menuitem", name="Run", exact=True).click()
             page.locator(".lm-Menu-item[data-command='runmenu:run-all']").click()
