@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from service.grading.reruns.repairs import Repair, add_after, add_first, replace_node
 from service.mutation.operators import is_documentation
 from service.mutation.source_tree import SourceTree
+from sim.readers.python_source import parse_module
 
 #: The similarity, from 0 to 1, from which two statements are versions of the same one.
 _MIN_SIMILARITY = 0.5
@@ -197,7 +198,7 @@ def _exchange(tree: SourceTree, ours: _Line, other: _Line, renaming: _Renaming) 
     new = renaming.render(heads[1])
     if new is None or new == ast.unparse(heads[0]):
         return
-    own_part, part = _narrow(heads[0], ast.parse(new).body[0])
+    own_part, part = _narrow(heads[0], parse_module(new).body[0])
     if isinstance(own_part, ast.expr):
         yield replace_node(tree, own_part, ast.unparse(part))
     elif not isinstance(ours.node, _BLOCKS):
