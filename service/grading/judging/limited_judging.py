@@ -149,6 +149,9 @@ def _guarded() -> Iterator[None]:
 
     previous_handlers = {number: signal.signal(number, raise_timeout) or signal.SIG_DFL for number in _LIMIT_SIGNALS}
     memory_limits = _limit_memory(_SMALL_LIMITS.memory_bytes)
+    # A collection looks at all objects of the process, whose time is not that of the judges.
+    is_collecting = gc.isenabled()
+    gc.disable()
     _set_timers(_SMALL_LIMITS.cpu_seconds, _SMALL_LIMITS.seconds)
     try:
         try:
@@ -158,6 +161,8 @@ def _guarded() -> Iterator[None]:
     finally:
         # Stop the timers again, in case one expired on the way here.
         _set_timers(0, 0)
+        if is_collecting:
+            gc.enable()
         resource.setrlimit(resource.RLIMIT_AS, memory_limits)
         for number, handler in previous_handlers.items():
             signal.signal(number, handler)
