@@ -125,8 +125,9 @@ def _read_claims(pending: PendingLaunch, id_token: str) -> dict[str, Any]:
     client_id = pending.platform.client_id
     claims = _decode_token(pending.platform, id_token)
     audience = claims["aud"]
+    party = claims.get("azp")  # who may present the token; required if it is for several
     has_other_audiences = isinstance(audience, list) and len(audience) > 1
-    if claims.get("azp", None if has_other_audiences else client_id) != client_id:
+    if party != client_id and (party is not None or has_other_audiences):
         raise UsageError("the platform's token is for another tool")
     if claims["nonce"] != pending.nonce:
         raise UsageError("this launch was already used or started elsewhere; open the link in the course again")

@@ -59,17 +59,20 @@ class GradebookLine:
 
 @dataclass(frozen=True, slots=True)
 class Gradebook:
-    """Columns and lines, with the assignments that are left out because their names are hidden.
-
-    ``found`` students match the search, on ``pages`` pages, of which this is ``page``.
-    """
+    """Columns and lines, with the assignments that are left out because their names are hidden."""
 
     columns: tuple[GradebookColumn, ...]
     lines: tuple[GradebookLine, ...]
     hidden: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GradebookPage(Gradebook):
+    """One of the ``pages`` of the ``found`` students that match a search."""
+
     found: int
-    page: int = 1
-    pages: int = 1
+    page: int
+    pages: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,7 @@ class _Frame:
     hidden: frozenset[str]
 
 
-def show_page(service: Service, actor: Actor, course_id: int, request: GradebookRequest) -> Gradebook:
+def show_page(service: Service, actor: Actor, course_id: int, request: GradebookRequest) -> GradebookPage:
     """Return the requested page of the students that match, or the last page if there are fewer. Raises NotFound."""
     with service.store.reading() as session:
         frame = _load_frame(session, actor, course_id)
@@ -90,7 +93,7 @@ def show_page(service: Service, actor: Actor, course_id: int, request: Gradebook
         page = min(max(request.page, 1), pages)
         shown_students = students[(page - 1) * _PAGE_SIZE : page * _PAGE_SIZE]
         lines = _load_lines(session, frame, shown_students)
-    return Gradebook(frame.columns, lines, tuple(sorted(frame.hidden)), len(students), page, pages)
+    return GradebookPage(frame.columns, lines, tuple(sorted(frame.hidden)), len(students), page, pages)
 
 
 def show_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> Gradebook:
@@ -99,7 +102,7 @@ def show_after(service: Service, actor: Actor, course_id: int, enrolment_id: int
         frame = _load_frame(session, actor, course_id)
         students = membership.list_members_after(session, course_id, enrolment_id, limit, Role.STUDENT)
         lines = _load_lines(session, frame, students)
-    return Gradebook(frame.columns, lines, tuple(sorted(frame.hidden)), len(students))
+    return Gradebook(frame.columns, lines, tuple(sorted(frame.hidden)))
 
 
 def show_whole(service: Service, actor: Actor, course_id: int) -> Gradebook:
@@ -108,7 +111,7 @@ def show_whole(service: Service, actor: Actor, course_id: int) -> Gradebook:
         frame = _load_frame(session, actor, course_id)
         students = _list_students(session, course_id)
         lines = _load_lines(session, frame, students)
-    return Gradebook(frame.columns, lines, tuple(sorted(frame.hidden)), len(students))
+    return Gradebook(frame.columns, lines, tuple(sorted(frame.hidden)))
 
 
 def download_table(service: Service, actor: Actor, course_id: int) -> Download:
