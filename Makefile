@@ -6,7 +6,7 @@ PYTHON := $(shell for p in python3.11 python3; do "$$p" -c 'import sys, venv, en
 # What is imported is compiled once and kept, also for who has that switched off: tests start thousands of processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test test-fast browser test-long test-all lint format bench bench-quick docs pictures editor lock wheel image release release-check clean
+.PHONY: setup demo test test-fast browser test-long test-all test-models lint format bench bench-quick docs pictures editor lock wheel image release release-check clean
 
 setup: $(VENV)/.ready
 
@@ -29,7 +29,7 @@ demo: setup
 
 # Three processes for two processors: many tests wait for other processes.
 test: setup lint
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not long" --durations 25
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not long and not training" --durations 25
 
 # The quick third, which needs no worker: the files that mark themselves as fast. The others are not even imported.
 test-fast: setup
@@ -43,6 +43,10 @@ test-long: setup browser
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m long --durations 40
 
 test-all: test test-long
+
+# Half an hour of training. To run when models/, the sensor's images or the versions of the libraries change.
+test-models: setup
+	$(BIN)/python -m pytest -n 2 -m training
 
 lint: setup
 	$(BIN)/ruff check .

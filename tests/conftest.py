@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,9 +29,26 @@ settings.load_profile("robomark")
 gc.disable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Start the longest tests first. If they started last, one processor would be idle while all wait for them."""
-    items.sort(key=lambda item: item.get_closest_marker("longest") is None)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Start the longest tests first. If they started last, one processor would be idle while all wait for them.
+
+    Each test process begins with a contiguous share of the list, so each share begins with some of the longest.
+    """
+    longest = [item for item in items if item.get_closest_marker("longest") is not None]
+    others = [item for item in items if item.get_closest_marker("longest") is None]
+    processes = getattr(config, "workerinput", {}).get("workercount", 1)
+    shares = [len(others) * number // processes for number in range(processes + 1)]
+    items[:] = [
+        item
+        for number, (start, end) in enumerate(itertools.pairwise(shares))
+        for item in (*longest[number::processes], *others[start:end])
+    ]
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Print each failure at once, so that a run which is stopped has told its failures."""
+    if report.failed and "PYTEST_XDIST_WORKER" not in os.environ:
+        print(f"\n{report.nodeid} {report.when}\n{report.longreprtext}", file=sys.__stderr__, flush=True)
 
 
 def pytest_collection_finish() -> None:

