@@ -170,6 +170,8 @@ class Settings:
     backoff_seconds: float = _define_setting(_build_seconds_parser(0, 3600), default=5.0)
     #: Time limit for one whole job in real time, in addition to all other limits.
     job_seconds: float = _define_setting(_build_seconds_parser(1, 86_400), default=900.0)
+    #: Search for the causes of lost marks when a worker has no other work.
+    search_causes: bool = _define_setting(_parse_boolean, default=True)
     #: Interval between self-tests of each process of a worker.
     self_test_seconds: float = _define_setting(_build_seconds_parser(1, 86_400), default=300.0)
     #: Age after which the notification of a queued job may be repeated.

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import structlog
 from hypothesis import HealthCheck, settings
 
 from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
@@ -24,6 +25,9 @@ _PATIENT = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("robomark", _PATIENT, derandomize=True)
 settings.register_profile("search", _PATIENT, max_examples=1000)
 settings.load_profile("robomark")
+
+# The default formatter of traces needs seconds for each, because it prints local variables.
+structlog.configure(processors=[structlog.dev.ConsoleRenderer(exception_formatter=structlog.dev.plain_traceback)])
 
 # Collecting tests creates little garbage, but garbage collection takes a third of the collection time.
 gc.disable()
@@ -62,13 +66,15 @@ def pytest_collection_finish() -> None:
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep commands under test away from the user's home and settings.
 
-    Their workers have one process for grading, because each process takes seconds to load and has little to grade.
+    Their workers have one process for grading, because each process takes seconds to load and has little to grade, and
+    they search no causes of lost marks.
     """
     with pytest.MonkeyPatch.context() as patched:
         for name in [name for name in os.environ if name.startswith("ROBOMARK_")]:
             patched.delenv(name)
         patched.setenv("ROBOMARK_HOME", str(tmp_path_factory.mktemp("home")))
         patched.setenv("ROBOMARK_CONCURRENCY", "1")
+        patched.setenv("ROBOMARK_SEARCH_CAUSES", "false")
         yield
 
 

@@ -86,7 +86,7 @@ class Notifier:
         due_plots = plots.count_due_plots(self.store)
         if due_plots:
             self.plot(self._count_missing(PLOTS, due_plots))
-        unexplained_grades = causes.count_unexplained_grades(self.store)
+        unexplained_grades = causes.count_unexplained_grades(self.store) if self.settings.search_causes else 0
         if unexplained_grades:
             self.explain(self._count_missing(CAUSES, unexplained_grades))
 

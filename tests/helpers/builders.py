@@ -38,13 +38,17 @@ PROGRAM = "from ev3dev2.sound import Sound\nprint('hello')\n"
 
 
 def settings_in(folder: Path, **changes: Any) -> Settings:
-    """Return settings with their home in ``folder``, and waiting times short enough for a test."""
+    """Return settings with their home in ``folder``, and waiting times short enough for a test.
+
+    Workers search no causes of lost marks, because each search takes seconds.
+    """
     values: dict[str, Any] = {
         "home": folder,
         "lease_seconds": 5.0,
         "backoff_seconds": 0.2,
         "notify_seconds": 1.0,
         "concurrency": 2,
+        "search_causes": False,
     }
     return Settings(**(values | changes))
 

@@ -28,7 +28,7 @@ def _assert_whole(tally: CampaignResults, grading_requests: int) -> None:
 @pytest.mark.long
 @pytest.mark.longest
 def test_on_sqlite(tmp_path: Path) -> None:
-    settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0)
+    settings = settings_in(tmp_path, concurrency=1, lease_seconds=3.0, search_causes=True)
     quiet = compute_expected_hashes()
     assert len(set(quiet)) == len(quiet)
     with open_store(settings) as store:

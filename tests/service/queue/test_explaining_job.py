@@ -10,8 +10,11 @@ import pytest
 from builders import opened, settings_in
 from responders.source_file import SourceFile
 from service.grading.trial_runner import TrialRunner
+from service.queue.broker import build_broker_url
+from service.queue.celery_app import make_celery
 from service.queue.explaining_job import explain_next_grade, is_student_waiting
 from service.queue.grading_job import GradingOutcome, grade_next_job
+from service.queue.notifier import Notifier
 from service.reports.view import build_staff_view, build_student_view
 from service.settings import Settings
 from service.store.batches.intake import accept_submission
@@ -89,6 +92,21 @@ def test_full_marks_need_no_causes(settings: Settings, runner: TrialRunner) -> N
         reference = read_example("echo-responder", "reference")
         submit(store, settings, runner, GradingRequest(reference, find_assignment("echo-responder"), "ada.zip"))
         assert explain_next_grade(store, settings, runner) is None
+
+
+@pytest.mark.parametrize(("search_causes", "expected"), [(True, [1]), (False, [])])
+def test_workers_are_notified_of_searches_unless_they_are_off(
+    settings: Settings, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, search_causes: bool, expected: list[int]
+) -> None:
+    notices: list[int] = []
+    monkeypatch.setattr(Notifier, "_count_missing", lambda _, queue, due: due)
+    monkeypatch.setattr(Notifier, "explain", lambda _, count: notices.append(count))
+    monkeypatch.setattr(Notifier, "plot", lambda _, count: None)
+    with opened(settings) as store:
+        submit(store, settings, runner, wrong_echo("ada"))
+        own_settings = replace(settings, search_causes=search_causes).with_broker(build_broker_url(settings))
+        Notifier(make_celery(own_settings), store, own_settings).catch_up()
+    assert notices == expected
 
 
 def test_failed_search_leaves_the_grade_without_causes(

@@ -57,3 +57,21 @@ def test_a_terminal_gets_lines_for_a_person() -> None:
     assert "no broker" in third
     assert "\x1b" not in output
     assert "{" not in output
+
+
+def test_a_trace_at_a_terminal_has_no_values() -> None:
+    code = (
+        "import structlog\n"
+        "from service.queue.logs import configure_logging\n"
+        "configure_logging('INFO')\n"
+        "def sign_in(password):\n    raise ValueError('wrong')\n"
+        "try:\n    sign_in('se' + 'cret')\n"
+        "except ValueError:\n    structlog.get_logger('ours').exception('failed')\n"
+    )
+    ours, its = pty.openpty()
+    subprocess.run([sys.executable, "-c", code], stdout=its, stderr=its, check=True)
+    output = os.read(ours, 65536).decode()
+    for end in (ours, its):
+        os.close(end)
+    assert "ValueError: wrong" in output
+    assert "secret" not in output
