@@ -199,7 +199,7 @@ def _print_state(line: CourseAssignment) -> None:
         closed_at=line.closed_at,
         version=line.version,
     )
-    state = "is open" if line.open else "is closed" if line.closed_at else "is not open yet"
+    state = "is open" if line.open else "is closed" if line.closed_at else "is prepared, and not open yet"
     print_line(f"{line.assignment} {state}")
 
 

@@ -16,6 +16,7 @@ from sqlalchemy.orm import Session
 from service.operations.context import Actor, Service
 from service.operations.exports import Download
 from service.operations.lookup import require_course
+from service.page_rows import select_page
 from service.reports.display_text import format_decimal
 from service.reports.formats.csv_output import render_safe_csv
 from service.search_text import fold_text
@@ -89,11 +90,9 @@ def show_page(service: Service, actor: Actor, course_id: int, request: Gradebook
         frame = _load_frame(session, actor, course_id)
         students = [each for each in _list_students(session, course_id) if each.matches(request.text)]
         students.sort(key=_build_sort_key(session, frame, students, request.sort), reverse=request.descending)
-        pages = max(1, -(-len(students) // _PAGE_SIZE))
-        page = min(max(request.page, 1), pages)
-        shown_students = students[(page - 1) * _PAGE_SIZE : page * _PAGE_SIZE]
-        lines = _load_lines(session, frame, shown_students)
-    return GradebookPage(frame.columns, lines, tuple(sorted(frame.hidden)), len(students), page, pages)
+        shown = select_page(students, request.page, _PAGE_SIZE)
+        lines = _load_lines(session, frame, shown.rows)
+    return GradebookPage(frame.columns, lines, tuple(sorted(frame.hidden)), len(students), shown.page, shown.pages)
 
 
 def show_after(service: Service, actor: Actor, course_id: int, enrolment_id: int, limit: int) -> Gradebook:

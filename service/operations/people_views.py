@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from service.operations.context import Actor, Service
 from service.operations.lookup import require_course, require_student
+from service.page_rows import select_page
 from service.store.courses import open_assignments, policies
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.courses.policies import ExtensionLine
@@ -67,13 +68,12 @@ def search_members(service: Service, actor: Actor, course_id: int, text: str = "
         extended_ids = frozenset(each.enrolment_id for each in policies.list_extensions(session, course_id))
         platform = lti.find_course_link(session, course_id)
     matching_members = [each for each in members if each.matches(text)]
-    pages = max(1, -(-len(matching_members) // _PAGE_SIZE))
-    number = min(number, pages)
+    shown = select_page(matching_members, number, _PAGE_SIZE)
     return MemberPage(
-        tuple(matching_members[(number - 1) * _PAGE_SIZE : number * _PAGE_SIZE]),
+        shown.rows,
         len(matching_members),
-        number,
-        pages,
+        shown.page,
+        shown.pages,
         sum(each.role is Role.STUDENT for each in members),
         extended_ids,
         platform,

@@ -31,6 +31,8 @@ def locate_assignment_folder(name_or_path: str | os.PathLike[str]) -> Path:
     name = os.fspath(name_or_path)
     try:
         folder = _find_folder(name)
+    except PermissionError as error:
+        raise UsageError(f"{name[:200]} cannot be read: {error.strerror}") from error
     except OSError:  # the name is too long for a file, for example
         folder = None
     if folder is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import pickle
 import re
 from collections import Counter
@@ -400,6 +401,15 @@ def test_what_is_no_assignment_is_refused(tmp_path: Path) -> None:
 def test_a_name_of_no_assignment_is_one_sentence(name: str) -> None:
     with pytest.raises(UsageError, match=r"^There is no assignment"):
         locate_assignment_folder(name)
+
+
+def test_a_folder_that_may_not_be_read_is_not_called_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: Path) -> bool:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_dir", refuse)
+    with pytest.raises(UsageError, match="^private/shapes cannot be read: Permission denied$"):
+        locate_assignment_folder("private/shapes")
 
 
 def test_assignment_is_found_by_id_and_by_path(tmp_path: Path) -> None:

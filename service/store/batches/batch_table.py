@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from service.page_rows import select_page
 from service.search_text import fold_text
 from service.store.batches.job_lines import match_standing_jobs
 from service.store.courses.hidden_names import HiddenNames
@@ -164,11 +165,8 @@ def build_table_page(lines: Sequence[TableLine], request: TableRequest) -> Table
         if (not request.state or line.state == request.state) and text in _build_search_text(line)
     ]
     matching_lines.sort(key=SORTS.get(request.sort, _build_student_key), reverse=request.descending)
-    pages = max(1, -(-len(matching_lines) // ROWS_A_PAGE))
-    page = min(max(request.page, 1), pages)
-    return TablePage(
-        tuple(matching_lines[(page - 1) * ROWS_A_PAGE : page * ROWS_A_PAGE]), len(matching_lines), page, pages
-    )
+    shown = select_page(matching_lines, request.page, ROWS_A_PAGE)
+    return TablePage(shown.rows, len(matching_lines), shown.page, shown.pages)
 
 
 def load_review_counts(session: Session, lines: Sequence[TableLine]) -> dict[str, ReviewCounts]:

@@ -16,6 +16,7 @@ from sqlalchemy import ColumnElement, Row, and_, func, or_, select, union_all
 from sqlalchemy.orm import Session, aliased
 
 from service.grading.class_statistics import PASS_SHARE
+from service.page_rows import select_page
 from service.store.batches.change_stages import (
     Comparison,
     CriterionTables,
@@ -88,15 +89,14 @@ def load_changes_page(
         return not change.is_open_or_differs, name, change.job_id
 
     changes = [change for change, _ in sorted(loaded_changes, key=get_order)]
-    page_count = max(1, -(-len(changes) // _CHANGES_A_PAGE))
-    page = min(max(page, 1), page_count)
+    shown = select_page(changes, page, _CHANGES_A_PAGE)
     return ChangesPage(
-        tuple(changes[(page - 1) * _CHANGES_A_PAGE : page * _CHANGES_A_PAGE]),
+        shown.rows,
         summarise_changes(changes, pass_share),
         len(changes),
         sum(change.is_open_or_differs for change in changes),
-        page,
-        page_count,
+        shown.page,
+        shown.pages,
     )
 
 
