@@ -408,7 +408,7 @@ def test_a_folder_that_may_not_be_read_is_not_called_missing(monkeypatch: pytest
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "is_dir", refuse)
-    with pytest.raises(UsageError, match="^private/shapes cannot be read: Permission denied$"):
+    with pytest.raises(UsageError, match=r"^private/shapes cannot be read: Permission denied$"):
         locate_assignment_folder("private/shapes")
 
 
