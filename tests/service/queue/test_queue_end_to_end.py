@@ -17,7 +17,7 @@ from sqlalchemy import func, select
 import acting
 from benchmarks.harness.postgresql_server import create_database
 from benchmarks.harness.process_tree import find_children, find_descendants, read_command_line
-from builders import comparable, grading_request, read_named_batch, settings_in
+from builders import comparable, grading_request, patient_echo, read_named_batch, settings_in
 from processes import PATIENCE, until
 from service.commands.batch.batch_waiter import BatchWaiter
 from service.grading.grader import grade
@@ -200,7 +200,7 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         service = Service(settings, store, services)
         batch = service.submit([grading_request("warm-1"), grading_request("warm-2")])
         service.wait(batch)
-        batch = service.submit(_spinning(1))
+        batch = service.submit([grading_request("spinner", SPIN, patient_echo())])
         job = service.until_running(batch)
         assert services.worker_pid is not None
         worker = services.worker_pid

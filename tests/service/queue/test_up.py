@@ -9,7 +9,6 @@ import signal
 import stat
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -19,7 +18,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from sqlalchemy import func, select
 
 from benchmarks.harness.process_tree import find_descendants, read_command_line
-from builders import accept_one, echo, grading_request, settings_in
+from builders import accept_one, grading_request, patient_echo, settings_in
 from processes import COMMAND, alive, robomark, until
 from service.command_line import main
 from service.queue.broker import is_broker_responding
@@ -162,9 +161,7 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
                 if any(word in read_command_line(pid) for word in ("valkey", "service.queue.worker", "web.server")):
                     os.kill(pid, signal.SIGKILL)
             until(lambda: not any(map(alive, first)))
-            # Longer than it takes to end everything on a busy machine.
-            patient = replace(echo(), limits=replace(echo().limits, program_cpu=8))
-            accept_batch(store, "spinning", [grading_request("spinner", SPIN, patient)], [], max_attempts=3)
+            accept_batch(store, "spinning", [grading_request("spinner", SPIN, patient_echo())], [], max_attempts=3)
             until(lambda: _jobs(store, JobState.RUNNING))
             assert _get(f"{address}/health/live")[0] == 200
             below = find_descendants(up.pid)
