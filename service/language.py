@@ -31,7 +31,7 @@ class Language:
         """Translate a sentence created elsewhere, including nested sentences; its values remain. Other text stays."""
         if not isinstance(sentence, Sentence):
             return sentence
-        template = self._translate_template(sentence.template) if sentence.template else ""
+        template = self.translate_template(sentence.template) if sentence.template else ""
         if not sentence.values:
             return template
         translated_parts = {
@@ -40,7 +40,7 @@ class Language:
         }
         return Sentence(template, **translated_parts)
 
-    def _translate_template(self, template: str) -> str:
+    def translate_template(self, template: str) -> str:
         """Return the translated template. A clause (``make_clause``) may have only the translation of its sentence."""
         capitalised = template[:1].upper() + template[1:]
         for known_template in dict.fromkeys((template, capitalised, f"{template}.", f"{capitalised}.")):

@@ -8,6 +8,9 @@ from service.grading.hint_tables import AMOUNTS
 from service.language import translatable
 from sim.sentences import Sentence
 
+#: The largest angle, in degrees, for which a program probably means a turn of the robot and not of its wheels.
+_LARGEST_TURN = 180
+
 
 def describe_large_amount(code: CodeStatements, statement: Statement, time_limit: float) -> str:
     """Return a hint that a call has a time or an amount in the wrong unit; otherwise empty."""
@@ -28,13 +31,19 @@ def describe_large_amount(code: CodeStatements, statement: Statement, time_limit
                 number=number,
                 seconds=number / 1000,
             )
-        return Sentence(
-            "%(name)s takes rotations, and %(number)g rotations are too many. For %(number)g degrees of the wheels "
-            "write on_for_degrees, or %(rotations)g rotations",
-            name=call.name,
-            number=number,
-            rotations=number / 360,
+        template = (
+            translatable(
+                "%(name)s takes rotations, and %(number)g rotations are too many. For %(number)g degrees of the wheels "
+                "write on_for_degrees, or %(rotations)g rotations. The robot itself turns less than its wheels: if it "
+                "is to turn by %(number)g degrees, try larger numbers"
+            )
+            if abs(number) <= _LARGEST_TURN
+            else translatable(
+                "%(name)s takes rotations, and %(number)g rotations are too many. For %(number)g degrees of the wheels "
+                "write on_for_degrees, or %(rotations)g rotations"
+            )
         )
+        return Sentence(template, name=call.name, number=number, rotations=number / 360)
     return ""
 
 

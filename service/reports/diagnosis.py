@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 
 from service.grading.grade import Accuracy, CriterionResult, Evidence, Grade, ShownCause
-from service.grading.judging.message_parts import find_line, states_fault
+from service.grading.judging.message_parts import WITHHELD_MARKS, find_line, states_fault
 from service.language import ENGLISH, Language
 from service.reports.display_text import to_display_text, to_one_line
 from service.reports.faults import SourceLine, extract_excerpt, find_named_source, group_faults
@@ -77,10 +77,11 @@ def describe_outcome(grade: Grade, diagnosis: Diagnosis, language: Language = EN
 def diagnose(grade: Grade, submission: Submission | None = None, language: Language = ENGLISH) -> Diagnosis:
     """Return the main cause: a hint, else a costly fault, a missing part, or the finding of the costliest criterion.
 
-    Excerpts need the ``submission``. If reruns showed the cause, their proof is added, and its next step replaces the
-    general one.
+    Excerpts need the ``submission``. If reruns showed the cause, their proof is added, and its next step replaces a
+    general one and one about another line.
     """
-    diagnosis = _diagnose_recorded_trials(_drop_refuted_hints(grade), submission, language)
+    unrefuted_grade = _drop_refuted_hints(grade)
+    diagnosis = _diagnose_recorded_trials(unrefuted_grade, submission, language)
     indices = {result.id: index for index, result in enumerate(grade.criteria) if result.marks < result.max_marks}
     causes = [each for each in grade.causes if each.criterion in indices]
     if not causes:
@@ -88,13 +89,20 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
     cause = min(causes, key=lambda each: _rank_cause(grade, indices[each.criterion], diagnosis))
     # The step about an error names the error, which is more than a rerun shows.
     has_no_error = grade.verdict in (Verdict.FINISHED, Verdict.TIME_LIMIT)
-    is_general = has_no_error and diagnosis.next_step == describe_grade(grade, language).next_step
+    is_general = diagnosis.next_step == describe_grade(grade, language).next_step
+    is_replaced = has_no_error and (is_general or _names_other_line(cause, unrefuted_grade))
     return replace(
         diagnosis,
-        next_step=format_cause_step(cause) if is_general else diagnosis.next_step,
+        next_step=format_cause_step(cause) if is_replaced else diagnosis.next_step,
         proof=format_proof(cause),
         proven=indices[cause.criterion],
     )
+
+
+def _names_other_line(cause: ShownCause, grade: Grade) -> bool:
+    """Return whether reruns showed a line that is not the one of the first hint."""
+    values = dict(iterate_values(cause.next_step))
+    return "line" in values and (values["file"], values["line"]) != find_line(next(iter(grade.hints), ""))
 
 
 def _drop_refuted_hints(grade: Grade) -> Grade:
@@ -244,6 +252,13 @@ def _describe_practice_finding(grade: Grade, result: CriterionResult, language: 
         (" " + language.say("From a criterion for practice (not marked): %(found)s", found=each) for each in findings),
         "",
     )
+
+
+def describe_withheld_marks(result: CriterionResult, language: Language = ENGLISH) -> str:
+    """Return the sentence about the criterion because of which this one gives no marks; empty if there is none."""
+    template = language.translate_template(WITHHELD_MARKS)
+    sentences = (part for part in iterate_parts(result.message) if part.template == template)
+    return next((to_display_text(sentence, 600) for sentence in sentences), "")
 
 
 def _list_failures(result: CriterionResult) -> list[Evidence]:

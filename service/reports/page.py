@@ -17,6 +17,7 @@ from service.reports.diagnosis import (
     Diagnosis,
     describe_finding,
     describe_outcome,
+    describe_withheld_marks,
     diagnose,
     list_further_proofs,
 )
@@ -248,11 +249,15 @@ def _build_criterion_line(
         if watched_failure is not None
         else 0.0
     )
+    if is_in_diagnosis:
+        told = describe_withheld_marks(result, language)
+    elif has_full_marks and result.set_by_hand is None:
+        told = ""
+    else:
+        told = describe_finding(grade, result, language)
     return CriterionLine(
         title=to_one_line(result.title, 200),
-        told=""
-        if is_in_diagnosis or (has_full_marks and result.set_by_hand is None)
-        else describe_finding(grade, result, language),
+        told=told,
         message=to_display_text(result.message, 1000, lines=12),
         marks=format_decimal(result.marks),
         max_marks=format_decimal(result.max_marks),

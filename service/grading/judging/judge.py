@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from service.grading.grade import CriterionResult, TrialResult
 from service.grading.judging.judge_declaration import Case, Judge, StaticAnalysis, judge_once
+from service.grading.judging.message_parts import WITHHELD_MARKS
 from service.grading.judging.outcome import fail_with
 from sim.errors import HostError
 from sim.recording import Verdict
@@ -91,8 +92,6 @@ def judge_one(criterion: Criterion, case: Case) -> CriterionResult:
 
 def _withhold_marks(result: CriterionResult, needed_result: CriterionResult) -> CriterionResult:
     """Return the result without marks, because the criterion that it needs has less than half of its own."""
-    reason = Sentence(
-        'This gives no marks, because "%(title)s" has less than half of its marks.', title=needed_result.title
-    )
+    reason = Sentence(WITHHELD_MARKS, title=needed_result.title)
     shown = result.shown and replace(result.shown, message=join_sentences(result.shown.message, reason))
     return replace(result, marks=Decimal("0.00"), message=join_sentences(result.message, reason), shown=shown)

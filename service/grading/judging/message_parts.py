@@ -16,6 +16,8 @@ from sim.sentences import Sentence, find_opening, iterate_values, join_sentences
 
 _MAX_QUOTE_LENGTH = 80
 _LINE = translatable("line %(line)s of %(name)s")
+#: The sentence about a criterion that gives no marks because of another one, whose title it has.
+WITHHELD_MARKS = translatable('This gives no marks, because "%(title)s" has less than half of its marks.')
 
 
 def quote_text(text: str) -> str:

@@ -114,6 +114,8 @@ def _describe_visibility(is_revealed: bool, revealed_count: int, reveals: int) -
             count=revealed_count,
             reveals=reveals,
         )
+    if not reveals:
+        return Sentence("Only staff see this: the assignment shows students no causes in hidden trials.")
     return Sentence(
         "Only staff see this: the student has seen %(count)s of %(reveals)s causes in hidden trials.",
         count=revealed_count,

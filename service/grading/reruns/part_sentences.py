@@ -124,7 +124,8 @@ def _describe_losing_answer(reruns: Sequence[Rerun], criterion: str) -> str:
                 passing = exchange.number
             elif isinstance(exchange, AnswersFrom) and rerun.loses(criterion):
                 failing = exchange.number
-    if passing is None or failing != passing + 1:
+    # That all answers of the reference pass is what the sentence before says.
+    if passing in (None, 1) or failing != passing + 1:
         return ""
     return Sentence(
         "With the reference's answers from number %(number)s on, the trial passes; from number %(next)s on, it still "

@@ -12,7 +12,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from service.grading.grade import CriterionResult
-from service.reports.diagnosis import Diagnosis, describe_outcome, diagnose, format_excerpt, list_further_proofs
+from service.reports.diagnosis import (
+    Diagnosis,
+    describe_outcome,
+    describe_withheld_marks,
+    diagnose,
+    format_excerpt,
+    list_further_proofs,
+)
 from service.reports.display_text import format_decimal, to_display_text, to_one_line
 from service.reports.faults import FaultGroup, describe_other_faults
 from service.reports.formats.registry import register_document, register_terminal
@@ -97,8 +104,11 @@ def _build_blocks(view: View, submission: Submission | None) -> Iterator[_Block]
     for comment in format_comments(grade):
         yield from (_Block(f"Comment: {comment}", 2), _BLANK)
     proofs = list_further_proofs(grade, diagnosis)
+    if diagnosis.lost:
+        yield _Line("Affected criteria:")
     for index in sorted(diagnosis.lost):
-        yield from _build_criterion(grade.criteria[index], "", proofs.get(index, ""))
+        result = grade.criteria[index]
+        yield from _build_criterion(result, describe_withheld_marks(result), proofs.get(index, ""))
     other_indices = [index for index in range(len(grade.criteria)) if index not in diagnosis.lost]
     if diagnosis.lost and other_indices:
         yield _BLANK
