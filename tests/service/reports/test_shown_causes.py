@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from decimal import Decimal
+from html import unescape
 
 import pytest
 
 from report_builders import line_follower_grade
 from service.grading.grade import Grade, ShownCause
-from service.grading.judging.message_parts import describe_line
+from service.grading.judging.message_parts import WITHHELD_MARKS, describe_line
 from service.language import load_language
 from service.reports.diagnosis import diagnose
 from service.reports.formats.json_output import build_json_document
 from service.reports.formats.text import render_plain_text
 from service.reports.html import render_report_page
 from service.reports.view import build_staff_view, build_student_view
-from sim.sentences import Sentence
+from sim.sentences import Sentence, join_sentences
 
 pytestmark = pytest.mark.fast
 
@@ -78,3 +80,33 @@ def test_hints_about_a_part_that_loses_nothing_are_dropped() -> None:
     assert diagnose(grade).cause.startswith("Line 3 of responder.py")
     assert diagnose(with_cause(grade, files=("robot.py",))).cause.startswith("Line 4 of robot.py")
     assert diagnose(with_cause(grade, files=("responder.py",))).cause.startswith("Line 3 of responder.py")
+
+
+@pytest.mark.parametrize(
+    ("line", "step"),
+    [
+        (4, "Fix line 4 of robot.py, run it without submitting, then submit again."),
+        (3, "Check line 3 of robot.py, then submit again."),
+    ],
+)
+def test_the_step_names_the_line_that_reruns_showed_if_a_hint_is_about_another(line: int, step: str) -> None:
+    hint = Sentence("%(place)s: something.", place=describe_line("robot.py", 4))
+    shown = Sentence("Check line %(line)s of %(file)s, then submit again.", line=line, file="robot.py")
+    assert diagnose(with_cause(replace(lost(), hints=(hint,)), next_step=shown)).next_step == step
+
+
+def test_affected_criteria_without_marks_because_of_another_say_so() -> None:
+    hint = Sentence("%(place)s: something.", place=describe_line("robot.py", 4))
+    first, *others = lost().criteria
+    reason = Sentence(WITHHELD_MARKS, title="Follows the line")
+    withheld = replace(first, marks=Decimal(0), message=join_sentences("As expected in all 4 trials.", reason))
+    grade = replace(lost(), hints=(hint,), criteria=(withheld, *others))
+    assert 0 in diagnose(grade).lost
+    reading = " ".join(render_plain_text(build_staff_view(grade)).split())
+    assert str(reason) in reading
+    assert "As expected in all 4 trials" not in reading
+    german = load_language("de")
+    translated = german.translate_sentence(reason)
+    assert translated != reason
+    page = unescape(render_report_page(build_student_view(grade, language=german), {}))
+    assert translated in page
