@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import psycopg
 import pytest
 import structlog
 from hypothesis import HealthCheck, settings
@@ -86,7 +87,11 @@ def runner() -> Iterator[TrialRunner]:
 
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[str]:
-    with PostgresqlServer() as server:
+    with PostgresqlServer() as server, psycopg.connect(server.url, autocommit=True) as connection:
+        # Nothing has to survive a loss of power.
+        for setting in ("fsync", "full_page_writes", "autovacuum"):
+            connection.execute(f"ALTER SYSTEM SET {setting} = off")
+        connection.execute("SELECT pg_reload_conf()")
         yield server.url
 
 

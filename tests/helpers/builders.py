@@ -11,8 +11,10 @@ from secrets import token_hex
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from sqlalchemy import text, update
+import psycopg
+from sqlalchemy import URL, make_url, text, update
 
+from benchmarks.harness.postgresql_server import create_database
 from responders.source_file import SourceFile
 from service.grading.grade import Grade
 from service.queue.self_test_record import open_self_test_record
@@ -62,6 +64,8 @@ def opened(settings: Settings) -> Iterator[Store]:
         file.touch(mode=0o600)
         tables, secret = _migrated()
         file.write_bytes(tables.replace(secret, token_hex(32).encode()))
+    elif settings.database.startswith("postgresql"):
+        _fill_postgresql(make_url(settings.database))
     with open_store(settings) as store:
         yield store
 
@@ -92,6 +96,32 @@ def _migrated() -> tuple[bytes, bytes]:
         with open_store(settings) as store:
             secret = load_secret(store)
         return (settings.home / "robomark.db").read_bytes(), secret.text.encode()
+
+
+def _fill_postgresql(database: URL) -> None:
+    """Replace the database, if it is empty, by a copy of migrated tables with a secret of its own."""
+    with psycopg.connect(_render(database)) as connection:
+        if connection.execute("SELECT 1 FROM pg_tables WHERE schemaname = 'public'").fetchone():
+            return
+    template = _migrated_database(_render(database.set(database="postgres")))
+    with psycopg.connect(_render(database.set(database="postgres")), autocommit=True) as connection:
+        connection.execute(f'DROP DATABASE "{database.database}"')
+        connection.execute(f'CREATE DATABASE "{database.database}" TEMPLATE "{template}"')
+    with psycopg.connect(_render(database)) as connection:
+        connection.execute("UPDATE installation SET secret = %s", [token_hex(32)])
+
+
+@cache
+def _migrated_database(server: str) -> str:
+    """Migrate a database on the server, and return its name."""
+    url = create_database(server)
+    with TemporaryDirectory() as folder, open_store(settings_in(Path(folder), database_url=url)):
+        pass
+    return make_url(url).database or ""
+
+
+def _render(url: URL) -> str:
+    return url.set(drivername="postgresql").render_as_string(hide_password=False)
 
 
 def echo() -> Assignment:

@@ -32,7 +32,7 @@ from sim.robot import get_robot
 from sim.world import HashChain, Noise, World
 
 #: One model of each file format is measured here. The cards of all models are compared with training's measurements.
-MEASURED = ["shapes", pytest.param("digits-cnn", marks=pytest.mark.long)]
+MEASURED = [pytest.param("shapes", marks=pytest.mark.long), pytest.param("digits-cnn", marks=pytest.mark.training)]
 
 #: Trains with each tenth of the images of two rounds, and prints the SHA-256 of the file.
 TRAIN_SHORTLY = """
@@ -94,7 +94,6 @@ def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: P
     assert about == load_card(name)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", MEASURED)
 def test_the_card_says_what_is_measured(name: str) -> None:
     result = evaluate(name)

@@ -52,10 +52,10 @@ def test_on_postgresql(tmp_path: Path) -> None:
             with open_store(settings) as store:
                 injector = FaultInjector(settings, store, server, workers=2, seed=2, disk=disk)
                 try:
-                    tally = Campaign(60, pause=(0.3, 1.3)).run(injector, compute_expected_hashes())
+                    tally = Campaign(40, pause=(0.3, 1.3)).run(injector, compute_expected_hashes())
                 finally:
                     injector.stop()
         finally:
             server.close()
-    _assert_whole(tally, 60)
+    _assert_whole(tally, 40)
     assert sum(tally.injected.values()) >= 5

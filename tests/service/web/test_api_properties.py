@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.long, pytest.mark.longest]
 #: description.
 _NOT_TOLD = [checks.ignored_auth, checks.positive_data_acceptance, checks.negative_data_rejection]
 _EXAMPLES = settings(
-    max_examples=10,
+    max_examples=6,
     deadline=None,
     database=None,
     derandomize=True,
