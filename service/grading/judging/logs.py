@@ -57,8 +57,8 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     readings = _READINGS[criterion.measured] if criterion.measured is not None else ""
     if logged_samples and not values:
         message = Sentence(
-            "Expected %(name)s to be %(readings)s, but all %(count)s samples are made up: none matches the reading at "
-            "the time of printing.",
+            "Expected %(name)s to be %(readings)s, but none of the %(count)s samples is the reading at the time of "
+            "printing.",
             name=name,
             readings=readings,
             count=len(logged_samples),
@@ -81,7 +81,7 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     )
     message = (
         Sentence(
-            "%(summary)s; %(count)s of %(total)s are made up, not %(readings)s.",
+            "%(summary)s; %(count)s of %(total)s are not %(readings)s at the time of printing.",
             summary=summary,
             count=invented_count,
             total=len(logged_samples),
@@ -95,7 +95,11 @@ def judge_datalog(criterion: Datalog, trial: TrialResult) -> Outcome:
     else:
         score = sum((reached for reached, _ in checks), Fraction(0)) / len(checks)
         outcome = fail_with(message, score=score, measures=measures)
-    strays = Strays(Sentence("so much of the log is made up"), invented_count)
+    strays = Strays(
+        Sentence("so many logged values are no readings"),
+        invented_count,
+        advice=translatable("Read the sensor again for each value."),
+    )
     return apply_stray_penalty(outcome, criterion, max(len(samples), 1), strays)
 
 

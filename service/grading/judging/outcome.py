@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from service.grading.findings import Finding, StrayItems
 from service.grading.grade import Measure
+from service.language import translatable
 from sim.recording import Fault, Pose, Recording, Verdict
 from sim.sentences import Sentence, join_sentences
 
@@ -82,6 +83,7 @@ class Strays:
     words: str
     misplaced: int = 0  # required items in a wrong place
     others: int = 0  # items of the same kind that are not required
+    advice: str = translatable("Give only the required answers, not every possible one.")
 
     @property
     def weight(self) -> Fraction:
@@ -97,10 +99,8 @@ def apply_stray_penalty(outcome: Outcome, criterion: CriterionWithStrays, count:
     return fail_with(
         join_sentences(
             outcome.message,
-            Sentence(
-                "Also, %(strays)s. This costs marks. Give only the required answers, not every possible one.",
-                strays=strays.words,
-            ),
+            Sentence("Also, %(strays)s. This costs marks.", strays=strays.words),
+            Sentence(strays.advice),
         ),
         outcome.t,
         outcome.pose,
