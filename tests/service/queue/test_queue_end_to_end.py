@@ -202,15 +202,13 @@ def test_a_worker_frozen_past_its_lease_changes_nothing_when_it_thaws(tmp_path: 
         service.wait(batch)
         batch = service.submit([grading_request("spinner", SPIN, patient_echo())])
         job = service.until_running(batch)
-        assert services.worker_pid is not None
-        worker = services.worker_pid
+        pool_child = job.process
+        assert pool_child is not None
         # A job runs for a while before the student's program does.
-        busy = until(lambda: [pid for pid in _pool_children(worker) if _has_student(pid)])
-        for pid in busy:
-            os.kill(pid, signal.SIGSTOP)
+        until(lambda: _has_student(pool_child))
+        os.kill(pool_child, signal.SIGSTOP)
         until(lambda: next((each for each in service.jobs(batch) if each.attempt == 2), None))
-        for pid in busy:
-            os.kill(pid, signal.SIGCONT)
+        os.kill(pool_child, signal.SIGCONT)
         service.wait(batch)
         service.assert_graded_once(batch)
         assert [each.id for each in service.jobs(batch)] == [job.id]
