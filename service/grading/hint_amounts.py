@@ -33,9 +33,8 @@ def describe_large_amount(code: CodeStatements, statement: Statement, time_limit
             )
         template = (
             translatable(
-                "%(name)s takes rotations, and %(number)g rotations are too many. For %(number)g degrees of the wheels "
-                "write on_for_degrees, or %(rotations)g rotations. The robot itself turns less than its wheels: if it "
-                "is to turn by %(number)g degrees, try larger numbers"
+                "%(name)s takes rotations, and %(number)g are too many. Write on_for_degrees for degrees of the "
+                "wheels, or try 0.5 to 4 rotations to turn the robot"
             )
             if abs(number) <= _LARGEST_TURN
             else translatable(

@@ -106,8 +106,7 @@ def test_lost_messages_are_the_cause_for_a_program_that_sends_once(runner: Trial
             {"responder": ("Python saw >>", "Python saw >")},
             "replies",
             "With the reference's responder in place of yours, the same program gets all 4 marks: the responder loses "
-            "the marks. The first answer that differs is number 1. With the reference's answers from number 1 on, the "
-            "trial passes; from number 2 on, it still fails.",
+            "the marks. The first answer that differs is number 1.",
         ),
         (
             {"responder": ('return f"', 'return "no" if text[-1] == "4" else f"')},
