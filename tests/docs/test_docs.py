@@ -66,8 +66,10 @@ def files_shown(document: Path) -> list[tuple[str, str]]:
 _SHOWING = [
     pytest.param(
         document,
-        marks=[pytest.mark.long]
-        * (document.stem in ("instructors", "models", "replay", "students", "tutorial", "web")),
+        marks=[
+            *[pytest.mark.long] * (document.stem in ("instructors", "models", "replay", "students", "tutorial", "web")),
+            *[pytest.mark.longest] * (document.stem == "instructors"),
+        ],
         id=document.stem,
     )
     for document in DOCUMENTS
