@@ -29,7 +29,7 @@ demo: setup
 
 # Three processes for two processors: many tests wait for other processes.
 test: setup lint
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not long and not training" --durations 25
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not long" --durations 25
 
 # The quick third, which needs no worker: the files that mark themselves as fast. The others are not even imported.
 test-fast: setup
@@ -40,7 +40,7 @@ browser:
 	which chromium chromium-browser google-chrome > /dev/null 2>&1 || timeout 300 apt-get install -y -q chromium > /dev/null 2>&1 || true
 
 test-long: setup browser
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m long --durations 40
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "long and not training" --durations 40
 
 test-all: test test-long
 

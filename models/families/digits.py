@@ -95,7 +95,10 @@ def list_digit_poses(background: str, sheet: int) -> tuple[LabelledPose, ...]:
 
 
 def build_examples(side: int, rounds: int) -> Examples:
-    """Return each digit unchanged, followed by distorted, moved and noisy versions for ``rounds`` - 1 rounds."""
+    """Return each digit unchanged, followed by distorted, moved and noisy versions for ``rounds`` - 1 rounds.
+
+    The images have shape (4000 * rounds, side * side).
+    """
     digits, labels = load_training_digits()
     rows = [
         compute_features(_build_example(digit, round_, number), side)

@@ -31,8 +31,10 @@ from sim.recording import Pose
 from sim.robot import get_robot
 from sim.world import HashChain, Noise, World
 
+#: Of the long tests, those that `make test-models` runs.
+FULL_TRAINING = (pytest.mark.long, pytest.mark.training)
 #: One model of each file format is measured here. The cards of all models are compared with training's measurements.
-MEASURED = [pytest.param("shapes", marks=pytest.mark.long), pytest.param("digits-cnn", marks=pytest.mark.training)]
+MEASURED = [pytest.param("shapes", marks=pytest.mark.long), pytest.param("digits-cnn", marks=FULL_TRAINING)]
 
 #: Trains with each tenth of the images of two rounds, and prints the SHA-256 of the file.
 TRAIN_SHORTLY = """
@@ -83,10 +85,7 @@ def test_a_short_training_gives_the_bytes_that_are_known(name: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=pytest.mark.training if name in SHORT_TRAININGS else pytest.mark.long)
-        for name in load_tasks()
-    ],
+    [pytest.param(name, marks=FULL_TRAINING if name in SHORT_TRAININGS else pytest.mark.long) for name in load_tasks()],
 )
 def test_training_again_gives_the_packaged_bytes_and_card(name: str, tmp_path: Path) -> None:
     about = train(name, tmp_path)

@@ -6,12 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from sqlalchemy.orm import Session
 
 from builders import opened, settings_in
+from processes import until
 from responders.source_file import SourceFile
+from service.grading.grade import ShownCause
 from service.grading.trial_runner import TrialRunner
 from service.queue.broker import build_broker_url
 from service.queue.celery_app import make_celery
+from service.queue.embedded_services import EmbeddedServices
 from service.queue.explaining_job import explain_next_grade, is_student_waiting
 from service.queue.grading_job import GradingOutcome, grade_next_job
 from service.queue.notifier import Notifier
@@ -21,7 +25,8 @@ from service.store.batches.intake import accept_submission
 from service.store.engine import Store
 from service.store.grades import causes, results
 from service.store.grades.causes import StoredCauses
-from service.store.states import JobQueue
+from service.store.states import JobQueue, JobState
+from service.store.tables.submissions import Job
 from submissions.assignment.examples import read_example
 from submissions.assignment.reader import find_assignment, read_assignment
 from submissions.grading_request import GradingRequest
@@ -107,6 +112,26 @@ def test_workers_are_notified_of_searches_unless_they_are_off(
         own_settings = replace(settings, search_causes=search_causes).with_broker(build_broker_url(settings))
         Notifier(make_celery(own_settings), store, own_settings).catch_up()
     assert notices == expected
+
+
+@pytest.mark.long
+def test_a_worker_without_other_work_searches(tmp_path: Path) -> None:
+    settings = settings_in(tmp_path, concurrency=1, search_causes=True)
+    with opened(settings) as store, EmbeddedServices(settings, store) as services:
+        job_id = accept_submission(store, wrong_echo("ada"), lane=JobQueue.INTERACTIVE, max_attempts=3).job_id
+        Notifier(make_celery(services.settings), store, services.settings).grade(JobQueue.INTERACTIVE, 1)
+
+        def list_causes() -> tuple[ShownCause, ...]:
+            services.ensure()
+            with store.reading() as session:
+                return results.load_grade(session, job_id).causes if _is_done(session, job_id) else ()
+
+        (cause,) = until(list_causes)
+        assert cause.criterion == "replies"
+
+
+def _is_done(session: Session, job_id: str) -> bool:
+    return session.get_one(Job, job_id).state is JobState.DONE
 
 
 def test_failed_search_leaves_the_grade_without_causes(

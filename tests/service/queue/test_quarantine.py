@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Thread
@@ -21,7 +20,7 @@ from sqlalchemy import select
 import false_worker
 import report_builders
 import sim.robot
-from builders import echo, grading_request, prepared, settings_in
+from builders import grading_request, prepared, settings_in
 from processes import until
 from responders.trial_spec import ProgramSpec, ResponderSpec
 from service.grading.grade import Grade
@@ -46,8 +45,6 @@ from service.store.states import JobQueue, JobState, Standing
 from service.store.tables.installation import SelfTest
 from service.store.tables.submissions import Job
 from sim.recording import Recording
-from submissions.assignment.examples import read_example
-from submissions.grading_request import GradingRequest
 
 MOVE = (
     "from ev3dev2.motor import MoveTank, OUTPUT_B, OUTPUT_C, SpeedPercent\n"
@@ -293,9 +290,9 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
 
         def submit(speeds: range) -> list[str]:
-            requests = [_drive_and_echo(speed) for speed in speeds]
-            batch = accept_batch(store, "class", requests, [], max_attempts=3)
-            notifier.grade(JobQueue.BATCH, len(requests))
+            programs = [grading_request(f"student-{speed}", MOVE.format(speed=speed)) for speed in speeds]
+            batch = accept_batch(store, "class", programs, [], max_attempts=3)
+            notifier.grade(JobQueue.BATCH, len(programs))
             return [job.job_id for job in batch.jobs]
 
         with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
@@ -324,15 +321,6 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
                 differs += _chains(results.load_grade(session, job_id)) != _chains(honest)
             assert differs, "the switch changed no grade"
         assert "worker.quarantined" in (tmp_path / "false_worker.log").read_text()
-
-
-def _drive_and_echo(speed: int) -> GradingRequest:
-    """Return a submission that gets full marks, so that no causes are searched, and has its own path."""
-    reference = read_example("echo-responder", "reference")
-    assert reference.program is not None
-    program = MOVE.format(speed=speed) + reference.program.text.replace("sleep(1)", "sleep(0.1)")
-    driving = reference.with_source("robot.py", program)
-    return GradingRequest(replace(driving, student=f"student-{speed}"), echo(), f"student-{speed}.zip")
 
 
 def _chains(graded: Grade) -> list[str]:
