@@ -100,9 +100,14 @@ def diagnose(grade: Grade, submission: Submission | None = None, language: Langu
 
 
 def _names_other_line(cause: ShownCause, grade: Grade) -> bool:
-    """Return whether reruns showed a line that is not the one of the first hint."""
+    """Return whether reruns showed a line that is not the one of the first hint.
+
+    A hint about a cell of a notebook is not compared, because reruns count the lines of the extracted file.
+    """
     values = dict(iterate_values(cause.next_step))
-    return "line" in values and (values["file"], values["line"]) != find_line(next(iter(grade.hints), ""))
+    place = find_line(next(iter(grade.hints), ""))
+    is_comparable = place is None or place[0] in {*PART_FILES.values(), SECOND_PROGRAM}
+    return "line" in values and is_comparable and (values["file"], values["line"]) != place
 
 
 def _drop_refuted_hints(grade: Grade) -> Grade:

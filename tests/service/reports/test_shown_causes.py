@@ -83,14 +83,15 @@ def test_hints_about_a_part_that_loses_nothing_are_dropped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "step"),
+    ("name", "line", "step"),
     [
-        (4, "Fix line 4 of robot.py, run it without submitting, then submit again."),
-        (3, "Check line 3 of robot.py, then submit again."),
+        ("robot.py", 4, "Fix line 4 of robot.py, run it without submitting, then submit again."),
+        ("robot.py", 3, "Check line 3 of robot.py, then submit again."),
+        ("cell 2", 3, "Fix line 4 of cell 2, run it without submitting, then submit again."),
     ],
 )
-def test_the_step_names_the_line_that_reruns_showed_if_a_hint_is_about_another(line: int, step: str) -> None:
-    hint = Sentence("%(place)s: something.", place=describe_line("robot.py", 4))
+def test_the_step_names_the_line_that_reruns_showed_if_a_hint_is_about_another(name: str, line: int, step: str) -> None:
+    hint = Sentence("%(place)s: something.", place=describe_line(name, 4))
     shown = Sentence("Check line %(line)s of %(file)s, then submit again.", line=line, file="robot.py")
     assert diagnose(with_cause(replace(lost(), hints=(hint,)), next_step=shown)).next_step == step
 
