@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 Found = TypeVar("Found")
-PATIENCE = 120
+PATIENCE = 300
 COMMAND = [sys.executable, "-c", "from service.cli import main; main()"]
 
 

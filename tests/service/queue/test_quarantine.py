@@ -283,8 +283,9 @@ def _worker(settings: Settings, *command: str, **more: str) -> Iterator[subproce
 def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submissions_again(
     tmp_path: Path, runner: TrialRunner
 ) -> None:
-    worker_settings = settings_in(tmp_path, concurrency=1, self_test_seconds=10.0, lease_seconds=6.0)
-    switch = tmp_path / "false"
+    worker_settings = settings_in(tmp_path, concurrency=1, self_test_seconds=3.0, lease_seconds=6.0)
+    switches = tmp_path / "switches"
+    switches.mkdir()
     entry = str(Path(false_worker.__file__))
     with EmbeddedBroker(worker_settings) as broker, open_store(worker_settings) as store:
         notifier = Notifier(make_celery(broker.settings), store, broker.settings)
@@ -295,15 +296,17 @@ def test_a_worker_that_turns_false_is_shut_out_and_another_grades_its_submission
             notifier.grade(JobQueue.BATCH, len(programs))
             return [job.job_id for job in batch.jobs]
 
-        with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switch)}) as wrong:
+        with _worker(broker.settings, entry, **{false_worker.VARIABLE: str(switches)}) as wrong:
             before = submit(range(10, 13))
             until(lambda: _unfinished(store) == 0)
             vouched = _last_right(store)
-            # The next check is then some seconds away.
             until(lambda: _last_right(store) != vouched)
-            switch.touch()
-            time.sleep(0.3)
+            (switches / false_worker.BECOME_FALSE).touch()
+            # The worker and its pool child.
+            until(lambda: len([*switches.glob(false_worker.IS_FALSE.format(pid="*"))]) >= 2)
             spoilt = submit(range(20, 24))
+            until(lambda: _unfinished(store) == 0)
+            (switches / false_worker.FIND_OUT).touch()
             until(lambda: any(_job(store, one).suspect for one in spoilt))
             assert wrong.wait(timeout=60) == QUARANTINED_STATUS
         with _worker(broker.settings, "-m", "service.queue.worker"):
