@@ -21,7 +21,7 @@ from service.report_files import render_each_report
 from service.reports.formats.json_output import build_json_document
 from service.reports.view import View, build_student_view
 from service.store.courses import policies
-from service.store.engine import Store
+from service.store.engine import Store, now
 from service.store.grades import current_grades, results
 from service.store.people import membership
 from service.store.queue.run_programs import split_program
@@ -124,7 +124,8 @@ def _load_submissions(session: Session, condition: ColumnElement[bool]) -> Itera
 def _load_seen_grades(session: Session, condition: ColumnElement[bool]) -> Iterator[tuple[int, View, str]]:
     """Yield the id, view and report of each submission whose grade the student may see."""
     query = select(Job.id, Job.submission_id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    submission_of = dict(session.execute(query.where(condition, *current_grades.CAN_COUNT)).all())
+    is_seen = (condition, *current_grades.CAN_COUNT, policies.match_released(now(session)))
+    submission_of = dict(session.execute(query.where(*is_seen)).all())
     visibilities = policies.load_visibilities_by_job(session, submission_of)
     grades = results.load_each_grade(session, submission_of)
     views = ((job_id, build_student_view(grade, visibilities[job_id])) for job_id, grade in grades)

@@ -19,7 +19,7 @@ from service.operations import people as people_operations
 from service.operations.assignments import CourseAssignment
 from service.operations.courses import DEFAULT_COURSE
 from service.operations.policies import ExtensionRequest, PolicyLimits
-from service.operations.types import CompletionRule, CountedAttempt
+from service.operations.types import CompletionRule, CountedAttempt, ReleaseRule
 from sim.errors import UsageError
 from submissions.roster import parse_time
 from submissions.student_identity import list_known_students, read_people
@@ -45,6 +45,13 @@ def policy(
     cool_down: Annotated[
         float, typer.Option(min=0, max=10_000, help="Minimum time between submissions, in minutes.")
     ] = 0.0,
+    release: Annotated[
+        ReleaseRule | None,
+        typer.Option(help="When students see grades: at once, own submissions at once, or when published."),
+    ] = None,
+    release_from: Annotated[
+        str | None, typer.Option(help="Students see all grades from this date, or date and time: 2026-12-14T09:00.")
+    ] = None,
     drop: Annotated[
         bool, typer.Option("--drop", help="Remove the policy. The policy for all assignments applies.")
     ] = False,
@@ -58,18 +65,26 @@ def policy(
     ] = None,
     course: CourseOption = DEFAULT_COURSE,
 ) -> None:
-    """Set the deadline and attempts, replacing the earlier policy. Without options, show the policy.
+    """Set deadline, attempts and release of grades, replacing the earlier policy. Without options, show the policy.
 
     The rules for grades are set separately: other options do not change them, and they do not replace a policy.
     """
-    limits = PolicyLimits(_parse_due(due), late_days, attempts, cool_down * 60)
-    if drop and limits != PolicyLimits():
+    limits = PolicyLimits(
+        _parse_due(due),
+        late_days,
+        attempts,
+        cool_down * 60,
+        release=release or ReleaseRule.OWN_AT_ONCE,
+        released_at=_parse_date("--release-from", release_from, end_of_day=False),
+    )
+    is_given = release is not None or limits != PolicyLimits()
+    if drop and is_given:
         raise UsageError("--drop removes all limits, expected no other limits with it")
     with open_installation() as (service, actor):
         course_id = courses.find(service, actor, course)
         if drop:
             policies.drop_policy(service, actor, course_id, assignment)
-        elif limits != PolicyLimits():
+        elif is_given:
             policies.set_policy(service, actor, course_id, assignment, limits)
         if counted_attempt is not None:
             policies.set_counted_attempt(service, actor, course_id, counted_attempt)
@@ -204,12 +219,20 @@ def _print_state(line: CourseAssignment) -> None:
 
 
 def _parse_due(text: str | None) -> datetime | None:
+    return _parse_date("--due", text, end_of_day=True)
+
+
+def _parse_date(option: str, text: str | None, *, end_of_day: bool) -> datetime | None:
     if text is None:
         return None
     try:
-        return parse_time(text, end_of_day=True)
+        return parse_time(text, end_of_day=end_of_day)
     except ValueError:
-        raise UsageError(f"--due is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
+        raise UsageError(f"{option} is {text!r}, expected a date or a date and time, like 2026-11-30T17:00") from None
+
+
+def _format_date(moment: datetime | None) -> str:
+    return "" if moment is None else moment.astimezone().strftime("%Y-%m-%d %H:%M")
 
 
 def _show_policies(
@@ -225,10 +248,17 @@ def _show_policies(
     if not limits_by_assignment:
         print_line("no policy: all submissions are marked at any time")
         return
-    table = create_table("assignment", "due", "late days", "attempts", "cool-down")
+    table = create_table("assignment", "due", "late days", "attempts", "cool-down", "students see grades", "all from")
     for assignment, limits in limits_by_assignment.items():
-        due = "" if limits.due_at is None else limits.due_at.astimezone().strftime("%Y-%m-%d %H:%M")
         attempts = "" if limits.attempts is None else str(limits.attempts)
         cool_down = f"{limits.cool_down_seconds / 60:g} min" if limits.cool_down_seconds else ""
-        table.add_row(assignment or "all others", due, str(limits.late_days), attempts, cool_down)
+        table.add_row(
+            assignment or "all others",
+            _format_date(limits.due_at),
+            str(limits.late_days),
+            attempts,
+            cool_down,
+            limits.release.value,
+            _format_date(limits.released_at),
+        )
     print_renderables(table)

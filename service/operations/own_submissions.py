@@ -52,6 +52,7 @@ class OwnSubmission:
     published: bool  # the whole grade is released
     plots: PlotState
     shown: bool  # its student may see its grade
+    withheld: bool  # its student will see its grade when it is released
     counts: bool  # its marks count for its assignment, and its student may know it
     best_counts: bool  # the best attempt counts in its course, instead of the latest
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
@@ -134,7 +135,8 @@ class OwnAttempts:
 def load_own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
     """Return the assignments that are open to a student or that they submitted to: open ones first, by due date."""
     submissions = _load_submissions(
-        session, _select_submissions(enrolment_id).where(or_(_is_counting(enrolment_id), _is_newest(enrolment_id)))
+        session,
+        _select_submissions(session, enrolment_id).where(or_(_is_counting(enrolment_id), _is_newest(enrolment_id))),
     )
     newest_submissions = {each.assignment: each for each in sorted(submissions, key=lambda each: each.attempt)}
     counting_submissions = {each.assignment: each for each in submissions if each.counts}
@@ -165,7 +167,9 @@ def load_own_attempts(session: Session, enrolment_id: int, assignment: str) -> O
     """Return a student's submissions to an assignment."""
     # The column's type makes any text storable; a bare literal would not.
     return _build_attempts(
-        _load_submissions(session, _select_attempts(enrolment_id, literal(assignment, SubmissionRow.assignment.type)))
+        _load_submissions(
+            session, _select_attempts(session, enrolment_id, literal(assignment, SubmissionRow.assignment.type))
+        )
     )
 
 
@@ -183,7 +187,7 @@ def find_submission_with_attempts(
     conditions = (row.id == submission_id, row.enrolment_id == enrolment_id)
     assignment = select(row.assignment).where(*conditions).scalar_subquery()
     submissions = _load_submissions(
-        session, _select_attempts(enrolment_id, assignment, SubmissionRow.id == submission_id)
+        session, _select_attempts(session, enrolment_id, assignment, SubmissionRow.id == submission_id)
     )
     submission = next((each for each in submissions if each.id == submission_id), None)
     return None if submission is None else (submission, _build_attempts(submissions))
@@ -193,7 +197,7 @@ def load_submissions_before(
     session: Session, enrolment_id: int, submission_id: int | None, limit: int
 ) -> list[OwnSubmission]:
     """Return at most ``limit`` submissions of a student to all assignments, newest first, before this one."""
-    query = _select_submissions(enrolment_id)
+    query = _select_submissions(session, enrolment_id)
     if submission_id is not None:
         query = query.where(SubmissionRow.id < submission_id)
     return _load_submissions(session, query.order_by(SubmissionRow.id.desc()).limit(limit))
@@ -201,8 +205,8 @@ def load_submissions_before(
 
 def find_own_submission(session: Session, enrolment_id: int, submission_id: int) -> OwnSubmission | None:
     """Return a student's submission; None if they do not have it."""
-    submissions = _load_submissions(session, _select_submissions(enrolment_id).where(SubmissionRow.id == submission_id))
-    return submissions[0] if submissions else None
+    query = _select_submissions(session, enrolment_id).where(SubmissionRow.id == submission_id)
+    return next(iter(_load_submissions(session, query)), None)
 
 
 def compute_allowance(session: Session, enrolment_id: int, assignment: str) -> Allowance:
@@ -225,11 +229,11 @@ def compute_allowances(session: Session, enrolment_id: int, assignments: Collect
     }
 
 
-_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool, bool, str | None]
+_SubmissionSelect = Select[SubmissionRow, Job, str, BatchState | None, int | None, bool, bool, bool, bool, str | None]
 
 
 def _select_attempts(
-    enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]
+    session: Session, enrolment_id: int, assignment: ColumnElement[str], *also: ColumnElement[bool]
 ) -> _SubmissionSelect:
     """Return a query for the newest submissions to an assignment, the one that counts, and those matching ``also``."""
     row = aliased(SubmissionRow)
@@ -239,7 +243,7 @@ def _select_attempts(
         _is_counting(enrolment_id),
         *also,
     )
-    query = _select_submissions(enrolment_id).where(SubmissionRow.assignment == assignment, is_included)
+    query = _select_submissions(session, enrolment_id).where(SubmissionRow.assignment == assignment, is_included)
     return query.order_by(SubmissionRow.attempt.desc())
 
 
@@ -264,7 +268,7 @@ def _is_newest(enrolment_id: int) -> ColumnElement[bool]:
     return tuple_(SubmissionRow.assignment, SubmissionRow.attempt).in_(newest_attempt)
 
 
-def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
+def _select_submissions(session: Session, enrolment_id: int) -> _SubmissionSelect:
     earlier_submission = aliased(SubmissionRow)
     same_attempt = (
         select(func.min(earlier_submission.attempt))
@@ -276,7 +280,13 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
         )
         .scalar_subquery()
     )
+    current_time = now(session)
+    is_released = policies.match_released(current_time)
     is_best, select_unpublished = policies.match_best_counts(), current_grades.select_unpublished_job
+    is_decided = and_(
+        select_unpublished("hidden", "after_published").is_(None),
+        current_grades.select_unreleased_job(current_time).is_(None),
+    )
     return (
         select(
             SubmissionRow,
@@ -284,8 +294,9 @@ def _select_submissions(enrolment_id: int) -> _SubmissionSelect:
             AssignmentVersion.title,
             Batch.state,
             same_attempt,
-            and_(*current_grades.CAN_COUNT),
-            and_(_is_counting(enrolment_id), or_(~is_best, select_unpublished("hidden", "after_published").is_(None))),
+            and_(*current_grades.CAN_COUNT, is_released),
+            and_(*current_grades.CAN_COUNT, ~is_released),
+            and_(_is_counting(enrolment_id), or_(~is_best, is_decided)),
             is_best,
             case((is_best, select_unpublished("after_due_date"))),
         )
@@ -303,9 +314,9 @@ def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSub
     otherwise be found by comparing attempts.
     """
     rows = session.execute(query).all()
-    submissions = [_build_submission(*row[:8]) for row in rows]
+    submissions = [_build_submission(*row[:9]) for row in rows]
     visible_job_ids = [each.job_id for each in submissions if each.shown]
-    due_job_ids = {row[8] for row in rows if row[8] is not None}
+    due_job_ids = {row[9] for row in rows if row[9] is not None}
     grades_by_job, visibilities_by_job = (
         results.load_marks(session, visible_job_ids),
         policies.load_visibilities_by_job(session, {*visible_job_ids, *due_job_ids}),
@@ -313,7 +324,7 @@ def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSub
     undecided = {
         submission.id
         for submission, row in zip(submissions, rows, strict=True)
-        if row[8] is not None and "after_due_date" not in visibilities_by_job[row[8]]
+        if row[9] is not None and "after_due_date" not in visibilities_by_job[row[9]]
     }
     submissions = [replace(each, counts=False) if each.id in undecided else each for each in submissions]
     return [
@@ -336,6 +347,7 @@ def _build_submission(
     batch: BatchState | None,
     same_as: int | None,
     is_shown: bool,
+    is_withheld: bool,
     counts: bool,
     best_counts: bool,
 ) -> OwnSubmission:
@@ -358,6 +370,7 @@ def _build_submission(
         published=job.published_at is not None,
         plots=job.plots,
         shown=is_shown,
+        withheld=is_withheld,
         counts=counts,
         best_counts=best_counts,
     )

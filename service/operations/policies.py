@@ -1,4 +1,4 @@
-"""Deadlines and attempts: the policies of a course, extensions for single students, and the rules for its grades."""
+"""Policies of a course: deadlines, attempts and release of grades, extensions of students, and rules for grades."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
 from service.store.states import CompletionRule, CountedAttempt, Role
 
+_DEADLINE = "%(date)s is not a valid deadline, expected a year from 2000 to 2199"
+_RELEASE_DATE = "%(date)s is not a valid date of release, expected a year from 2000 to 2199"
 _MAX_LATE_DAYS, _MAX_ATTEMPTS, _MAX_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
 
@@ -41,7 +43,8 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
         Invalid: A limit is out of range.
         UsageError: The assignment does not exist.
     """
-    _check_due_date(limits.due_at)
+    _check_date(limits.due_at, _DEADLINE)
+    _check_date(limits.released_at, _RELEASE_DATE)
     if not 0 <= limits.late_days <= _MAX_LATE_DAYS:
         raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MAX_LATE_DAYS)
     if limits.attempts is not None and not 1 <= limits.attempts <= _MAX_ATTEMPTS:
@@ -62,10 +65,12 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
             "course",
             str(course_id),
             assignment=assignment,
-            due_at=_format_due_date(limits.due_at),
+            due_at=_format_date(limits.due_at),
             late_days=limits.late_days,
             attempts=limits.attempts,
             cool_down_seconds=limits.cool_down_seconds,
+            release=limits.release.value,
+            released_at=_format_date(limits.released_at),
         )
 
 
@@ -120,7 +125,7 @@ def extend(
     """
     if request.due_at is None and not request.more_attempts:
         raise Invalid("an extension needs a later deadline, additional attempts, or both")
-    _check_due_date(request.due_at)
+    _check_date(request.due_at, _DEADLINE)
     if not 0 <= request.more_attempts <= _MAX_ATTEMPTS:
         raise Invalid("additional attempts must be from 0 to %(most)s", most=_MAX_ATTEMPTS)
     with service.store.transaction() as session:
@@ -135,7 +140,7 @@ def extend(
             str(course_id),
             student=row.student,
             assignment=request.assignment,
-            due_at=_format_due_date(request.due_at),
+            due_at=_format_date(request.due_at),
             more_attempts=request.more_attempts,
         )
         return policies.load_limits(session, enrolment_id, request.assignment)
@@ -148,12 +153,10 @@ def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: in
         return policies.load_limits(session, enrolment_id, assignment)
 
 
-def _check_due_date(due_at: datetime | None) -> None:
-    if due_at is not None and not 2000 <= due_at.year < 2200:
-        raise Invalid(
-            "%(date)s is not a valid deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat()
-        )
+def _check_date(moment: datetime | None, message: str) -> None:
+    if moment is not None and not 2000 <= moment.year < 2200:
+        raise Invalid(message, date=moment.date().isoformat())
 
 
-def _format_due_date(due_at: datetime | None) -> str | None:
-    return None if due_at is None else due_at.isoformat()
+def _format_date(moment: datetime | None) -> str | None:
+    return None if moment is None else moment.isoformat()

@@ -11,6 +11,7 @@ from service.store.states import CredentialKind as CredentialKind
 from service.store.states import JobQueue as JobQueue
 from service.store.states import JobState as JobState
 from service.store.states import PlotState as PlotState
+from service.store.states import ReleaseRule as ReleaseRule
 from service.store.states import Role as Role
 from service.store.states import RunState as RunState
 from service.store.states import Standing as Standing

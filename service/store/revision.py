@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 from sim.sentences import Sentence
 
 #: The oldest revision whose code can use the tables of the newest one. Code older than 0025 publishes grades without
-#: statements; ``robomark log check`` names them.
+#: statements, which ``robomark log check`` names; code older than 0026 shows grades before they are released.
 OLDEST_COMPATIBLE = "0019"
 _TABLE = "alembic_version"
 _COMPATIBILITY = table("schema_compatibility", column("oldest_compatible"))

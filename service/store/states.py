@@ -29,6 +29,14 @@ class CompletionRule(StrEnum):
     EXACT = "exact"  # exact marks replace the published ones in any case
 
 
+class ReleaseRule(StrEnum):
+    """When students see the grades of an assignment, unless a date releases them before."""
+
+    AT_ONCE = "at-once"  # all of them when they are graded
+    OWN_AT_ONCE = "own-at-once"  # what students submitted themselves at once; what staff uploaded when it is published
+    PUBLISHED = "published"  # all of them when they are published
+
+
 class CredentialKind(StrEnum):
     """The kind of a credential."""
 

@@ -1,4 +1,4 @@
-"""Deadlines and attempts: the policy of a course, the attempt that counts, extensions of students, and their effects.
+"""Policies of a course: deadlines, attempts, the attempt that counts, the release of grades, and extensions.
 
 A submission over a limit is stored and can be marked, but only staff see it. This module rejects no submissions.
 """
@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Literal
 
-from sqlalchemy import ColumnElement, delete, exists, func, or_, select
+from sqlalchemy import ColumnElement, and_, delete, exists, func, or_, select
 from sqlalchemy.exc import NoResultFound
 from sqlalchemy.orm import Session
 
 from service.store.conditional_insert import insert_if_new
 from service.store.courses.local_days import add_days, count_days_after, find_local_zone
 from service.store.engine import now
-from service.store.states import CountedAttempt, JobState
-from service.store.tables.courses import Course, Extension, Policy
+from service.store.states import CountedAttempt, JobState, ReleaseRule
+from service.store.tables.courses import Course, Extension, OpenAssignment, Policy
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 
@@ -31,13 +31,18 @@ _UNCOUNTED_VERDICTS = ("assignment_error", "host_error")
 
 @dataclass(frozen=True, slots=True)
 class PolicyLimits:
-    """Limits of one student. ``attempts`` counts different submissions. None means no limit, or no due date."""
+    """Limits of one student. ``attempts`` counts different submissions. None means no limit, or no due date.
+
+    ``release`` and ``released_at`` say when students see grades; at ``released_at`` they see all that exist.
+    """
 
     due_at: datetime | None = None
     late_days: int = 0
     attempts: int | None = None
     cool_down_seconds: float = 0.0
     zone: str = ""  # of the counted days; empty for this server's
+    release: ReleaseRule = ReleaseRule.OWN_AT_ONCE
+    released_at: datetime | None = None
 
     @property
     def closed_at(self) -> datetime | None:
@@ -186,6 +191,7 @@ def set_policy(session: Session, course_id: int, assignment: str, limits: Policy
     row.due_at, row.late_days = limits.due_at, limits.late_days
     row.attempts, row.cool_down_seconds = limits.attempts, limits.cool_down_seconds
     row.zone = limits.zone or find_local_zone()
+    row.release, row.released_at = limits.release, limits.released_at
 
 
 def drop_policy(session: Session, course_id: int, assignment: str) -> None:
@@ -207,6 +213,29 @@ def match_best_counts() -> ColumnElement[bool]:
         Course.counted_attempt == CountedAttempt.BEST,
     )
     return best_course.correlate(SubmissionRow)
+
+
+def match_released(
+    current_time: datetime, job: type[Job] = Job, submission: type[SubmissionRow] = SubmissionRow
+) -> ColumnElement[bool]:
+    """Return the condition that the grade of a job, joined with its submission, is released to its student.
+
+    It says nothing of the criteria that open later, nor of limits: ``current_grades`` has the other conditions.
+    """
+    course_id = select(Enrolment.course_id).where(Enrolment.id == submission.enrolment_id).scalar_subquery()
+    is_applicable = (Policy.course_id == course_id, Policy.assignment.in_(("", submission.assignment)))
+    # The policy of the assignment, or the default, whose assignment is empty and comes last.
+    policy_id = select(Policy.id).where(*is_applicable).order_by(Policy.assignment.desc()).limit(1)
+    policy = Policy.id == policy_id.correlate(submission).scalar_subquery()
+    rule = func.coalesce(select(Policy.release).where(policy).scalar_subquery(), ReleaseRule.OWN_AT_ONCE)
+    batch_of_own = exists().where(OpenAssignment.batch_id == submission.batch_id)
+    is_own = or_(submission.batch_id.is_(None), batch_of_own.correlate(submission))
+    return or_(
+        job.published_at.is_not(None),
+        rule == ReleaseRule.AT_ONCE,
+        and_(rule == ReleaseRule.OWN_AT_ONCE, is_own),
+        exists().where(policy, Policy.released_at <= current_time).correlate(submission),
+    )
 
 
 def extend_policy(
@@ -253,7 +282,9 @@ def _load_known_policies(
 
 
 def _build_limits(row: Policy) -> PolicyLimits:
-    return PolicyLimits(row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone)
+    return PolicyLimits(
+        row.due_at, row.late_days, row.attempts, row.cool_down_seconds, row.zone, row.release, row.released_at
+    )
 
 
 def _find_closed_assignments(session: Session, pairs: Collection[tuple[int, str]]) -> set[tuple[int, str]]:

@@ -9,6 +9,7 @@ from sqlalchemy import Select, and_, func, or_, select
 from sqlalchemy.orm import Session
 
 from service.store import audit, webhook_events
+from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
 from service.store.engine import now
 from service.store.grades import current_grades
@@ -44,7 +45,8 @@ class AppealLine:
 def can_appeal(session: Session, submission_id: int) -> bool:
     """Return whether the submission has a grade that its student may see."""
     visible_grade = select(Job.id).join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-    visible_grade = visible_grade.where(SubmissionRow.id == submission_id, *current_grades.CAN_COUNT)
+    is_visible = (*current_grades.CAN_COUNT, policies.match_released(now(session)))
+    visible_grade = visible_grade.where(SubmissionRow.id == submission_id, *is_visible)
     return session.scalar(visible_grade) is not None
 
 

@@ -7,6 +7,7 @@ how it was submitted. The best has the highest share of its maximum marks, as ad
 
 from __future__ import annotations
 
+from datetime import datetime
 from functools import cache
 from typing import Protocol
 
@@ -62,10 +63,23 @@ def select_unpublished_job(*visibilities: str) -> ColumnElement[str | None]:
     It has a criterion with one of these visibilities, and its attempt can count.
     """
     attempt, job = aliased(SubmissionRow), aliased(Job)
+    query = _select_other_grade(attempt, job).join(CriterionResultRow, CriterionResultRow.job_id == job.id)
+    query = query.where(job.published_at.is_(None), CriterionResultRow.visibility.in_(visibilities))
+    return query.correlate(SubmissionRow).scalar_subquery()
+
+
+def select_unreleased_job(current_time: datetime) -> ColumnElement[str | None]:
+    """Return a job of the student and assignment of a ``SubmissionRow`` that can count and is not released."""
+    attempt, job = aliased(SubmissionRow), aliased(Job)
+    query = _select_other_grade(attempt, job).where(~policies.match_released(current_time, job, attempt))
+    return query.correlate(SubmissionRow).scalar_subquery()
+
+
+def _select_other_grade(attempt: type[SubmissionRow], job: type[Job]) -> Select[str]:
+    """Return a query for a grade of the student and assignment of a ``SubmissionRow`` that can count."""
     return (
         select(func.min(job.id))
         .join(attempt, job.submission_id == attempt.id)
-        .join(CriterionResultRow, CriterionResultRow.job_id == job.id)
         .where(
             attempt.enrolment_id == SubmissionRow.enrolment_id,
             attempt.assignment == SubmissionRow.assignment,
@@ -73,11 +87,7 @@ def select_unpublished_job(*visibilities: str) -> ColumnElement[str | None]:
             job.state == JobState.DONE,
             job.suspect.is_(None),
             job.standing == Standing.STANDS,
-            job.published_at.is_(None),
-            CriterionResultRow.visibility.in_(visibilities),
         )
-        .correlate(SubmissionRow)
-        .scalar_subquery()
     )
 
 

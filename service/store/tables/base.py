@@ -23,6 +23,7 @@ from service.store.states import (
     JobQueue,
     JobState,
     PlotState,
+    ReleaseRule,
     Role,
     Standing,
 )
@@ -58,6 +59,7 @@ class Base(DeclarativeBase):
         Role: _build_enum_type(Role),
         CountedAttempt: _build_enum_type(CountedAttempt),
         CompletionRule: _build_enum_type(CompletionRule),
+        ReleaseRule: _build_enum_type(ReleaseRule),
         CredentialKind: _build_enum_type(CredentialKind),
         JobQueue: _build_enum_type(JobQueue),
         JobState: _build_enum_type(JobState),

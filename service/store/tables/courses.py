@@ -14,7 +14,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from service.store.ids import LENGTH as ID_LENGTH
 from service.store.ids import generate_id
-from service.store.states import CompletionRule, CountedAttempt
+from service.store.states import CompletionRule, CountedAttempt, ReleaseRule
 from service.store.tables.base import Base
 
 
@@ -68,7 +68,7 @@ class OpenAssignment(Base):
 
 
 class Policy(Base):
-    """Deadline and attempts of a course; an empty ``assignment`` is the default for those without a policy."""
+    """Deadline, attempts and release of grades; an empty ``assignment`` is the default for those without a policy."""
 
     __tablename__ = "policy"
     __table_args__ = (Index(None, "course_id", "assignment", unique=True),)
@@ -81,6 +81,10 @@ class Policy(Base):
     attempts: Mapped[int | None]
     cool_down_seconds: Mapped[float] = mapped_column(default=0.0)
     zone: Mapped[str] = mapped_column(String(64), default="", server_default="")  # of late days; empty: the server's
+    release: Mapped[ReleaseRule] = mapped_column(
+        default=ReleaseRule.OWN_AT_ONCE, server_default=ReleaseRule.OWN_AT_ONCE.value
+    )
+    released_at: Mapped[datetime | None]  # students see all grades from this moment on
 
 
 class Extension(Base):

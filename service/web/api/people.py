@@ -12,7 +12,7 @@ from pydantic import AfterValidator, AwareDatetime, BaseModel, Field
 
 from service.operations import people, people_views, policies
 from service.operations.policies import ExtensionRequest, PolicyLimits
-from service.operations.types import CompletionRule, CountedAttempt, JobState, Role
+from service.operations.types import CompletionRule, CountedAttempt, JobState, ReleaseRule, Role
 from service.web.access import RowNumber
 from service.web.api.shapes import Shape, build_example_config
 from service.web.api_access import CallerInCourse, require_role
@@ -122,9 +122,21 @@ class PolicyShape(Shape):
         None, ge=1, le=1000, description="Maximum number of different submissions; null for no limit."
     )
     cool_down_seconds: float = Field(0.0, ge=0, le=600_000, description="Minimum time between submissions, in seconds.")
+    release: ReleaseRule = Field(
+        ReleaseRule.OWN_AT_ONCE,
+        description="When students see grades: `at-once`; `published`; or `own-at-once`, their own submissions at once "
+        "and uploads of staff when published.",
+    )
+    released_at: Moment | None = Field(None, description="Students see all grades from this moment on. Null for none.")
 
     model_config = build_example_config(
-        assignment="", due_at="2026-11-30T17:00:00Z", late_days=2, attempts=5, cool_down_seconds=600
+        assignment="",
+        due_at="2026-11-30T17:00:00Z",
+        late_days=2,
+        attempts=5,
+        cool_down_seconds=600,
+        release="published",
+        released_at="2026-12-14T09:00:00Z",
     )
 
 
@@ -233,7 +245,7 @@ def extend(access: ManageAccess, context: Context, enrolment_id: RowNumber, body
 
 @router.get("/courses/{course_id}/policies")
 def list_policies(access: ReadAccess, context: Context, limit: Limit = 50, after: After = "") -> Listed[PolicyShape]:
-    """List the policies: deadline and attempts, by assignment."""
+    """List the policies: deadline, attempts and release of grades, by assignment."""
     sort_key = decode_cursor(after, str)
     limits_by_assignment = policies.list_policies(context.service, access.actor, access.course_id)
     shapes = [
@@ -247,7 +259,14 @@ def list_policies(access: ReadAccess, context: Context, limit: Limit = 50, after
 @router.put("/courses/{course_id}/policies")
 def set_policy(access: ManageAccess, context: Context, body: PolicyBody) -> PolicyShape:
     """Set the policy of an assignment. Without an assignment, set the course's default policy."""
-    policy_limits = PolicyLimits(body.due_at, body.late_days, body.attempts, body.cool_down_seconds)
+    policy_limits = PolicyLimits(
+        body.due_at,
+        body.late_days,
+        body.attempts,
+        body.cool_down_seconds,
+        release=body.release,
+        released_at=body.released_at,
+    )
     policies.set_policy(context.service, access.actor, access.course_id, body.assignment, policy_limits)
     return _to_policy_shape(body.assignment, policy_limits)
 
@@ -295,4 +314,6 @@ def _to_policy_shape(assignment: str, policy_limits: PolicyLimits) -> PolicyShap
         late_days=policy_limits.late_days,
         attempts=policy_limits.attempts,
         cool_down_seconds=policy_limits.cool_down_seconds,
+        release=policy_limits.release,
+        released_at=policy_limits.released_at,
     )

@@ -16,7 +16,7 @@ from service.operations import assignment_uploads, assignment_views, assignments
 from service.operations.assignment_uploads import AssignmentAlreadySeen, UploadRequest
 from service.operations.assignments import CourseAssignment
 from service.operations.policies import PolicyLimits
-from service.operations.types import CompletionRule, CountedAttempt, Role
+from service.operations.types import CompletionRule, CountedAttempt, ReleaseRule, Role
 from service.pending_uploads import clean_file_name
 from service.web.access import CourseInstructor, ReaderInCourse
 from service.web.api_uploads import MAX_ASSIGNMENT_BYTES
@@ -169,9 +169,18 @@ def set_policy(
     late_days: Annotated[int, Form(ge=0, le=365)] = 0,
     attempts: Annotated[str, Form(pattern="^[0-9]{0,4}$")] = "",
     cool_down: Annotated[float, Form(ge=0, le=10_000)] = 0.0,
+    release: Annotated[ReleaseRule, Form()] = ReleaseRule.OWN_AT_ONCE,
+    released: Annotated[str, Form(max_length=40)] = "",
 ) -> Response:
-    """Set deadline and attempts for one assignment, or the default for assignments without a policy."""
-    policy_limits = PolicyLimits(parse_date_time(due), late_days, int(attempts) if attempts else None, cool_down * 60)
+    """Set deadline, attempts and release of grades of one assignment, or the default for those without a policy."""
+    policy_limits = PolicyLimits(
+        parse_date_time(due),
+        late_days,
+        int(attempts) if attempts else None,
+        cool_down * 60,
+        release=release,
+        released_at=parse_date_time(released),
+    )
     policies.set_policy(context.service, access.actor, access.course_id, assignment, policy_limits)
     return RedirectResponse(f"{_build_path(access, assignment)}?done=policy", 303)
 
