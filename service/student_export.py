@@ -11,6 +11,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import asdict
 from typing import Any
 
 from sqlalchemy import ColumnElement, and_, or_, select
@@ -20,6 +21,7 @@ from service.notebook_engine.stored_requests import list_stored_files
 from service.report_files import render_each_report
 from service.reports.formats.json_output import build_json_document
 from service.reports.view import View, build_student_view
+from service.store.batches.rejected_files import load_rejected_files
 from service.store.courses import policies
 from service.store.engine import Store, now
 from service.store.grades import current_grades, results
@@ -29,8 +31,7 @@ from service.store.queue.test_runs import NOTEBOOK_CHECKS, NOTEBOOK_RUNS
 from service.store.tables.courses import AssignmentVersion, Course, Extension
 from service.store.tables.grades import Appeal
 from service.store.tables.people import Credential, Enrolment, Person
-from service.store.tables.submissions import Batch, Job, SubmissionRow, Tryout
-from submissions.student_names import normalise_name
+from service.store.tables.submissions import Job, SubmissionRow, Tryout
 
 #: Number of submissions fetched at once.
 _CHUNK_SIZE = 10
@@ -154,18 +155,14 @@ def _load_test_runs(
 
 
 def _load_rejected_files(session: Session, enrolment: Enrolment, without: Set[str]) -> list[dict[str, Any]]:
-    """Return the student's rejected files in batches, oldest first.
+    """Return the student's rejected files.
 
-    With assignments in ``without``, files without a known assignment are left out, too. The reasons are left out,
-    because they can name other students.
+    With assignments in ``without``, files without a known assignment are left out, too.
     """
-    query = select(Batch).where(Batch.course_id == enrolment.course_id).order_by(Batch.created_at, Batch.id)
     return [
-        {"source": each["source"], "assignment": each["assignment"], "created_at": batch.created_at}
-        for batch in session.scalars(query)
-        for each in batch.refusals
-        if normalise_name(each["student"]["id"]) == enrolment.student
-        and not (without and each["assignment"] in {"", *without})
+        asdict(each)
+        for each in load_rejected_files(session, enrolment)
+        if not (without and each.assignment in {"", *without})
     ]
 
 

@@ -15,6 +15,7 @@ from sqlalchemy import ColumnElement, Select, and_, case, func, literal, or_, se
 from sqlalchemy.orm import Session, aliased
 
 from service.grading.grade import Grade
+from service.operations.own_changes import MarksChange, load_changes
 from service.reports.view import build_student_view
 from service.store.codec import decode
 from service.store.courses import open_assignments, policies
@@ -58,6 +59,7 @@ class OwnSubmission:
     released: frozenset[str] = frozenset()  # the visibilities that its student sees
     marks: Decimal | None = None
     max_marks: Decimal | None = None
+    change: MarksChange | None = None  # the last change of published marks
 
     @property
     def waits(self) -> bool:
@@ -117,7 +119,7 @@ class OwnAssignment:
     assignment: str
     title: str
     open: bool
-    closed: bool  # it was open, and no longer is
+    closed_at: datetime | None  # None if it is open, or was never opened
     allowance: Allowance
     newest: OwnSubmission | None
     counting: OwnSubmission | None  # the one whose marks count
@@ -133,7 +135,7 @@ class OwnAttempts:
 
 
 def load_own_assignments(session: Session, course_id: int, enrolment_id: int) -> list[OwnAssignment]:
-    """Return the assignments that are open to a student or that they submitted to: open ones first, by due date."""
+    """Return the opened assignments and those that a student submitted to: open ones first, by due date."""
     submissions = _load_submissions(
         session,
         _select_submissions(session, enrolment_id).where(or_(_is_counting(enrolment_id), _is_newest(enrolment_id))),
@@ -142,17 +144,16 @@ def load_own_assignments(session: Session, course_id: int, enrolment_id: int) ->
     counting_submissions = {each.assignment: each for each in submissions if each.counts}
     newest_appeals = appeals.load_newest_appeals(session, enrolment_id)
     course_assignments = open_assignments.list_assignments(session, course_id)
-    titles = {each.assignment: each.title for each in course_assignments if each.open}
-    is_open = frozenset(titles)
-    is_closed = frozenset(each.assignment for each in course_assignments if each.closed_at is not None)
-    titles = {name: each.title for name, each in newest_submissions.items()} | titles
+    opened_assignments = {each.assignment: each for each in course_assignments if each.opened_at is not None}
+    titles = {name: each.title for name, each in newest_submissions.items()}
+    titles |= {name: each.title for name, each in opened_assignments.items() if each.open or name not in titles}
     allowances = compute_allowances(session, enrolment_id, titles)
     lines = [
         OwnAssignment(
             name,
             title,
-            name in is_open,
-            name in is_closed,
+            name in opened_assignments and opened_assignments[name].open,
+            opened_assignments[name].closed_at if name in opened_assignments else None,
             allowances[name],
             newest_submissions.get(name),
             counting_submissions.get(name),
@@ -327,17 +328,24 @@ def _load_submissions(session: Session, query: _SubmissionSelect) -> list[OwnSub
         if row[9] is not None and "after_due_date" not in visibilities_by_job[row[9]]
     }
     submissions = [replace(each, counts=False) if each.id in undecided else each for each in submissions]
+    published_ids = [each.id for each in submissions if each.shown and each.published]
+    changes = load_changes(session, published_ids) if published_ids else {}
     return [
-        _add_marks(each, grades_by_job[each.job_id], visibilities_by_job[each.job_id])
+        _add_marks(each, grades_by_job[each.job_id], visibilities_by_job[each.job_id], changes.get(each.id))
         if each.job_id in grades_by_job
         else each
         for each in submissions
     ]
 
 
-def _add_marks(submission: OwnSubmission, grade: Grade, visibilities: frozenset[str]) -> OwnSubmission:
+def _add_marks(
+    submission: OwnSubmission, grade: Grade, visibilities: frozenset[str], change: MarksChange | None
+) -> OwnSubmission:
     visible_grade = build_student_view(grade, visibilities).grade
-    return replace(submission, marks=visible_grade.marks, max_marks=visible_grade.max_marks, released=visibilities)
+    marks, max_marks = visible_grade.marks, visible_grade.max_marks
+    if change is not None and (change.marks, change.max_marks) == (marks, max_marks):
+        change = None
+    return replace(submission, marks=marks, max_marks=max_marks, released=visibilities, change=change)
 
 
 def _build_submission(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -18,6 +19,7 @@ from service.report_files import render_report_body, render_standalone_report
 from service.reports.html import ReportParts
 from service.reports.view import View, build_student_view
 from service.store.batches import stored_requests
+from service.store.batches.rejected_files import RejectedFile, load_rejected_files
 from service.store.courses import open_assignments
 from service.store.courses.open_assignments import CourseAssignment
 from service.store.grades import appeals, results
@@ -38,7 +40,16 @@ class TaskView:
     counting: OwnSubmission | None
     allowance: Allowance
     is_open: bool
+    closed_at: datetime | None  # None if it is open, or was never opened
     can_test_run: bool
+
+
+@dataclass(frozen=True, slots=True)
+class OwnWork:
+    """A student's assignments, most urgent first, and rejected files without a later submission."""
+
+    assignments: list[OwnAssignment]
+    rejected_files: list[RejectedFile]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +74,21 @@ class ReportView:
     report: ReportParts | None
 
 
-def list_assignments(service: Service, actor: Actor, course_id: int) -> list[OwnAssignment]:
-    """Return the assignments that are open to the actor or that they submitted to, most urgent first.
+def show_work(service: Service, actor: Actor, course_id: int) -> OwnWork:
+    """Return the opened assignments and those that the actor submitted to, and the actor's rejected files.
 
     Raises NotFound.
     """
     with service.store.reading() as session:
-        return own_submissions.load_own_assignments(
-            session, course_id, _require_enrolment_id(session, actor, course_id)
-        )
+        enrolment = require_own_enrolment(session, actor, course_id, Role.STUDENT)
+        lines = own_submissions.load_own_assignments(session, course_id, enrolment.id)
+        last_times = {each.assignment: each.newest.submitted_at for each in lines if each.newest is not None}
+        rejected_files = [
+            each
+            for each in load_rejected_files(session, enrolment)
+            if each.assignment not in last_times or last_times[each.assignment] < each.created_at
+        ]
+        return OwnWork(lines, rejected_files)
 
 
 def list_opened(
@@ -91,7 +108,7 @@ def list_opened(
 
 
 def show_sheet(service: Service, actor: Actor, course_id: int, assignment: str) -> TaskSheet:
-    """Return the task of an assignment. Raises NotFound if it is not open, unless the actor submitted to it."""
+    """Return the task of an assignment. Raises NotFound if it was not opened, unless the actor submitted to it."""
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
         return build_task_sheet(load_visible_assignment(session, course_id, enrolment_id, assignment))
@@ -110,7 +127,8 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
     with service.store.reading() as session:
         enrolment_id = _require_enrolment_id(session, actor, course_id)
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
-        is_open = is_assignment_open(session, course_id, assignment)
+        opened = find_opened_assignment(session, course_id, assignment)
+        is_open = opened is not None and opened.open
         attempts = own_submissions.load_own_attempts(session, enrolment_id, assignment)
         return TaskView(
             build_task_sheet(visible_assignment),
@@ -118,6 +136,7 @@ def show_task(service: Service, actor: Actor, course_id: int, assignment: str) -
             attempts.counting,
             own_submissions.compute_allowance(session, enrolment_id, assignment),
             is_open,
+            None if opened is None else opened.closed_at,
             can_test_run=is_open and build_single_trial_assignment(visible_assignment) is not None,
         )
 
@@ -199,20 +218,32 @@ def show_files(service: Service, actor: Actor, course_id: int, submission_id: in
         return SubmittedFiles(row.packed, f"{row.assignment}-{row.attempt}.zip")
 
 
+def find_opened_assignment(session: Session, course_id: int, assignment: str) -> CourseAssignment | None:
+    """Return an assignment of a course that is open or was closed; None if there is none."""
+    course_assignments = open_assignments.list_assignments(session, course_id)
+    is_opened = (each for each in course_assignments if each.assignment == assignment and each.opened_at is not None)
+    return next(is_opened, None)
+
+
 def is_assignment_open(session: Session, course_id: int, assignment: str) -> bool:
     """Return whether students can submit to an assignment of a course."""
-    course_assignments = open_assignments.list_assignments(session, course_id)
-    return any(each.assignment == assignment and each.open for each in course_assignments)
+    opened = find_opened_assignment(session, course_id, assignment)
+    return opened is not None and opened.open
 
 
 def load_visible_assignment(session: Session, course_id: int, enrolment_id: int, assignment: str) -> Assignment:
-    """Return an assignment that is open or that the student has submitted to. Raises NotFound."""
-    if is_assignment_open(session, course_id, assignment):
-        return open_assignments.load_assignment(session, course_id, assignment)
-    newest_attempt = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
-    if not newest_attempt:
+    """Return an assignment that was opened, or that the student has submitted to. Raises NotFound.
+
+    A closed one is returned as the student submitted to it.
+    """
+    opened = find_opened_assignment(session, course_id, assignment)
+    if opened is None or not opened.open:
+        newest_attempts = own_submissions.load_own_attempts(session, enrolment_id, assignment).newest
+        if newest_attempts:
+            return stored_requests.load_assignment(session, newest_attempts[0].job_id)
+    if opened is None:
         raise _build_not_found()
-    return stored_requests.load_assignment(session, newest_attempt[0].job_id)
+    return open_assignments.load_assignment(session, course_id, assignment)
 
 
 def _require_enrolment_id(session: Session, actor: Actor, course_id: int) -> int:

@@ -14,8 +14,6 @@ from service.store.courses.assignment_versions import check_assignment
 from service.store.courses.policies import PolicyLimits as PolicyLimits
 from service.store.states import CompletionRule, CountedAttempt, Role
 
-_DEADLINE = "%(date)s is not a valid deadline, expected a year from 2000 to 2199"
-_RELEASE_DATE = "%(date)s is not a valid date of release, expected a year from 2000 to 2199"
 _MAX_LATE_DAYS, _MAX_ATTEMPTS, _MAX_COOL_DOWN_SECONDS = 365, 1000, 600_000
 
 
@@ -43,8 +41,12 @@ def set_policy(service: Service, actor: Actor, course_id: int, assignment: str, 
         Invalid: A limit is out of range.
         UsageError: The assignment does not exist.
     """
-    _check_date(limits.due_at, _DEADLINE)
-    _check_date(limits.released_at, _RELEASE_DATE)
+    _check_due_date(limits.due_at)
+    if limits.released_at is not None and not _is_plausible(limits.released_at):
+        raise Invalid(
+            "%(date)s is not a valid date for the release of grades, expected a year from 2000 to 2199",
+            date=limits.released_at.date().isoformat(),
+        )
     if not 0 <= limits.late_days <= _MAX_LATE_DAYS:
         raise Invalid("the days for late submissions must be from 0 to %(most)s", most=_MAX_LATE_DAYS)
     if limits.attempts is not None and not 1 <= limits.attempts <= _MAX_ATTEMPTS:
@@ -125,7 +127,7 @@ def extend(
     """
     if request.due_at is None and not request.more_attempts:
         raise Invalid("an extension needs a later deadline, additional attempts, or both")
-    _check_date(request.due_at, _DEADLINE)
+    _check_due_date(request.due_at)
     if not 0 <= request.more_attempts <= _MAX_ATTEMPTS:
         raise Invalid("additional attempts must be from 0 to %(most)s", most=_MAX_ATTEMPTS)
     with service.store.transaction() as session:
@@ -153,9 +155,15 @@ def show_limits(service: Service, actor: Actor, course_id: int, enrolment_id: in
         return policies.load_limits(session, enrolment_id, assignment)
 
 
-def _check_date(moment: datetime | None, message: str) -> None:
-    if moment is not None and not 2000 <= moment.year < 2200:
-        raise Invalid(message, date=moment.date().isoformat())
+def _check_due_date(due_at: datetime | None) -> None:
+    if due_at is not None and not _is_plausible(due_at):
+        raise Invalid(
+            "%(date)s is not a valid deadline, expected a year from 2000 to 2199", date=due_at.date().isoformat()
+        )
+
+
+def _is_plausible(moment: datetime) -> bool:
+    return 2000 <= moment.year < 2200
 
 
 def _format_date(moment: datetime | None) -> str | None:

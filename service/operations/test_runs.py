@@ -14,7 +14,7 @@ from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
 from service.operations.lookup import require_own_enrolment
 from service.operations.own_submissions import Allowance
-from service.operations.own_views import is_assignment_open, load_visible_assignment
+from service.operations.own_views import find_opened_assignment, load_visible_assignment
 from service.operations.submissions import load_submission_target
 from service.reports.start_picture import StartPicture, build_start_picture
 from service.store.queue import test_runs
@@ -54,6 +54,7 @@ class TestRunView:
     picture: StartPicture | None
     allowance: Allowance
     is_open: bool
+    closed_at: datetime | None  # None if it is open, or was never opened
     line: StudentTestRun | None
     replay: bytes | None  # compressed
     origins: tuple[TextOrigin, ...]
@@ -100,7 +101,7 @@ def show_newest(
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
         sheet = build_task_sheet(visible_assignment)
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
-        is_open = is_assignment_open(session, course_id, assignment)
+        opened = find_opened_assignment(session, course_id, assignment)
         newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
         line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
         replay = test_runs.load_replay(session, newest_id) if newest_id else None
@@ -112,7 +113,8 @@ def show_newest(
         trial_assignment.scenarios[0].seconds if trial_assignment else None,
         build_start_picture(trial_assignment) if trial_assignment else None,
         allowance,
-        is_open,
+        opened is not None and opened.open,
+        None if opened is None else opened.closed_at,
         line,
         replay,
         tuple(each for each in TextOrigin if each in texts_by_origin),

@@ -24,7 +24,7 @@ from service.store.people import webhooks
 from service.store.people.membership import Member
 from service.store.people.students import Students
 from service.store.queue import jobs
-from service.store.states import JobState
+from service.store.states import JobState, ReleaseRule
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
 from submissions.grading_request import GradingRequest
@@ -60,7 +60,7 @@ def make_nameless_course(web: Web) -> NamelessCourse:
             open_assignments.prepare_assignment(session, 1, freeze_assignment(assignment))
             open_assignments.open_for_students(session, 1, assignment.id)
         open_assignments.hide_names(session, 1, ASSIGNMENT, True)
-        policies.set_policy(session, 1, ASSIGNMENT, PolicyLimits(None, 0, 2, 0.0))
+        policies.set_policy(session, 1, ASSIGNMENT, PolicyLimits(None, 0, 2, 0.0, release=ReleaseRule.AT_ONCE))
         webhooks.create_webhook(session, 1, "https://hooks.example.org/", ["grade.finished", "appeal.opened"])
         web_batch = open_assignments.load_course_assignment(session, 1, ASSIGNMENT).batch_id
     *most, last = STUDENTS

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import report_builders
-from builders import echo, grading_request, prepared
+from builders import echo, grading_request, prepared, release_at_once
 from service.notebook_engine.stored_requests import build_owner
 from service.pending_uploads import PendingUploads
 from service.store.batches import intake
@@ -38,6 +38,7 @@ class World:
 def make_world(web: Web) -> World:
     """Create one object of every kind."""
     ada, grace = web.student("ada"), web.instructor("grace")
+    release_at_once(web.store)
     batch = intake.accept_batch(web.store, "week one", [grading_request("ada")], (), course=COURSE, max_attempts=3)
     _grade_all(web)
     given = replace(echo(), given={"notes.txt": b"counts from 0"})

@@ -11,6 +11,7 @@ from fastapi.responses import Response
 from pydantic import Field
 
 from service.operations import own_views
+from service.operations.own_changes import ChangeReason
 from service.operations.own_views import SubmissionView
 from service.operations.submissions import SubmissionRequest
 from service.operations.types import JobState, Role
@@ -88,6 +89,20 @@ class PlaceShape(Shape):
     workers: int = Field(description="Number of active workers.")
 
 
+class MarksChangeShape(Shape):
+    """The visible marks before a published grade was replaced."""
+
+    marks: float
+    max_marks: float
+    changed_at: datetime
+    reason: ChangeReason = Field(
+        description="What changed: `assignment`, its version; `pool`, all trials were run; `grader`, its release; "
+        "`again`, none of these."
+    )
+
+    model_config = build_example_config(marks=3, max_marks=6, changed_at="2026-11-23T10:00:00Z", reason="assignment")
+
+
 class SubmissionShape(Shape):
     """A submission of the token's owner, with its grading state."""
 
@@ -108,6 +123,8 @@ class SubmissionShape(Shape):
     marks: float | None = Field(description="The visible part of the marks; null if there are none.")
     max_marks: float | None
     published: bool = Field(description="Whether the grade is published; until then, parts of it can be hidden.")
+    withheld: bool = Field(description="Whether the grade becomes visible when it is released.")
+    change: MarksChangeShape | None = Field(description="The last change of published marks; null without one.")
 
     model_config = build_example_config(
         id=3,
@@ -124,6 +141,8 @@ class SubmissionShape(Shape):
         marks=None,
         max_marks=None,
         published=False,
+        withheld=False,
+        change=None,
     )
 
 

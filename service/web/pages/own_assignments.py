@@ -54,8 +54,15 @@ class _Rejection:
 @router.get("/courses/{course_id}/mine")
 def list_own_assignments(request: Request, access: CourseStudent, context: Context) -> Response:
     """Show the open assignments and the student's submissions."""
-    lines = own_views.list_assignments(context.service, access.actor, access.course_id)
-    return render_page(request, access.reader, "own_assignments.html", access=access, lines=lines)
+    work = own_views.show_work(context.service, access.actor, access.course_id)
+    return render_page(
+        request,
+        access.reader,
+        "own_assignments.html",
+        access=access,
+        lines=work.assignments,
+        rejected_files=work.rejected_files,
+    )
 
 
 @router.get("/courses/{course_id}/mine/{assignment}")
@@ -148,6 +155,7 @@ def _render_assignment(
         curve=compute_marks_curve(task.attempts),
         allowance=task.allowance,
         is_open=task.is_open,
+        closed_at=task.closed_at,
         can_try=task.can_test_run,
         rejection=rejection,
     )

@@ -95,6 +95,7 @@ def _render_test_run(
         picture=view.picture,
         allowance=view.allowance,
         is_open=view.is_open,
+        closed_at=view.closed_at,
         origins=view.origins,
         origin=view.origin,
         rejection=rejection,

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from sqlalchemy import select
 
-from builders import echo, grading_request
+from builders import echo, grading_request, release_at_once
 from command import robomark
 from paths import ROOT
 from report_builders import faulty_grade, shape_grade
@@ -194,6 +194,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     with open_store(Settings(home=folder)) as store:
         requests = [grading_request(student, assignment=echo()) for student in ("ada", "bob", "cyd")]
         batch = accept_batch(store, "class", requests, refused, max_attempts=2)
+        release_at_once(store)
         with store.transaction() as session:
             open_assignments.prepare_assignment(session, 1, freeze_assignment(echo()))
             for course, who in (("default", "linus"), ("other", "tess")):

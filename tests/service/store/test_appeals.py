@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import update
 
 import report_builders
-from builders import grading_request, prepared
+from builders import grading_request, prepared, release_at_once
 from service.store import audit
 from service.store.batches.intake import accept_batch
 from service.store.courses import open_assignments
@@ -24,6 +24,7 @@ NONE_HIDDEN = HiddenNames(frozenset(), b"")
 
 def _submitted(store: Store) -> None:
     accept_batch(store, "class", [grading_request("ada")], [], max_attempts=3)
+    release_at_once(store)
 
 
 def _graded(store: Store) -> None:

@@ -14,7 +14,7 @@ from sqlalchemy import select, update
 
 import acting
 import report_builders
-from builders import grading_request, prepared
+from builders import grading_request, prepared, release_at_once
 from rows import quick_first
 from service.batch_rows import describe_missing_grade
 from service.lti import passback
@@ -62,6 +62,7 @@ def _set_rule(store: Store, rule: CountedAttempt) -> None:
     with store.transaction() as session:
         ensure_course(session, "default", datetime.now(UTC))
         session.get_one(Course, 1).counted_attempt = rule
+    release_at_once(store)
 
 
 def _grade_with(store: Store, program: str, marks: int, batch_id: str | None = None) -> str:

@@ -14,7 +14,7 @@ from sqlalchemy import func, select, update
 import acting
 import report_builders
 from benchmarks.harness.postgresql_server import create_database
-from builders import grading_request, settings_in
+from builders import grading_request, release_at_once, settings_in
 from service.settings import Settings
 from service.store.backup import back_up, restore
 from service.store.batches.intake import accept_batch, accept_new_submissions
@@ -62,6 +62,7 @@ def _grade_all(store: Store) -> None:
 def _filled(store: Store) -> str:
     """Store two students, a copy of a reviewed grade, a regrade, and a waiting job. Return the first batch."""
     first = _batch(store, "first", "ada", "bob 🤖")
+    release_at_once(store)
     copied = accept_new_submissions(store, "same again", [grading_request("eve")], [], max_attempts=3).batch
     assert copied is not None
     _look_again(store, copied.jobs[0].job_id)

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 import acting
 import report_builders
-from builders import grading_request, prepared, settings_in
+from builders import grading_request, prepared, release_at_once, settings_in
 from service.operations import privacy
 from service.pending_uploads import PendingUploads
 from service.store import audit
@@ -211,6 +211,7 @@ def test_what_is_old_goes_with_all_that_was_said_of_it(store: Store) -> None:
 
 def test_the_zip_has_what_the_student_may_see(store: Store) -> None:
     enrolment_id = everything(store)
+    release_at_once(store)
     with zipfile.ZipFile(io.BytesIO(export_student(store, enrolment_id))) as archive:
         names = set(archive.namelist())
         document = json.loads(archive.read("student.json"))

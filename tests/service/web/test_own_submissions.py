@@ -85,15 +85,18 @@ def _grade(web: Web, marks: str = "1") -> None:
         jobs.finish_job(web.store, claim, prepared(grade), datetime.now(UTC))
 
 
-def test_only_what_is_open_or_was_submitted_to_is_listed(web: Web, ada: Member) -> None:
+def test_only_what_was_opened_or_was_submitted_to_is_listed(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
     page_text = browser.get(MINE).text
     assert "About open" in page_text
+    assert "About closed" in page_text
     assert "About prepared" not in page_text
-    assert "About closed" not in page_text
-    for name in ("prepared", "closed", "no-such", "submissions"):
+    for name in ("prepared", "no-such", "submissions"):
         assert browser.get(f"{MINE}/{name}").status_code == 404
         assert _send(browser, path=f"{MINE}/{name}").status_code == 404
+    assert browser.get(f"{MINE}/closed").status_code == 200
+    refused = _send(browser, path=f"{MINE}/closed")
+    assert (refused.status_code, "is closed; you can no longer submit to it" in refused.text) == (422, True)
 
 
 def test_the_list_has_closed_assignments_and_those_of_batches_with_their_grades(web: Web, ada: Member) -> None:
@@ -105,8 +108,8 @@ def test_the_list_has_closed_assignments_and_those_of_batches_with_their_grades(
     assert answer.status_code == 200
     listed = words(answer.text)
     assert listed.count("Current grade:") == 2
-    assert "About closed closed" in listed
-    assert listed.count("closed closed") == 1
+    assert "About closed Closed on" in listed
+    assert listed.count("Closed on") == 1
 
 
 def test_a_task_tells_nothing_that_is_hidden_and_gives_what_is_given(web: Web, ada: Member) -> None:
@@ -318,7 +321,7 @@ def test_cards_come_by_due_date_then_title(web: Web, ada: Member) -> None:
         for name, days in (("zebra", 9), ("soon", 2), ("apple", 9)):
             policies.set_policy(session, 1, name, PolicyLimits(datetime(2100, 1, days, tzinfo=UTC)))
     try:
-        assert re.findall(r">About (\w+)</a>", browser.get(MINE).text) == ["soon", "apple", "zebra", "open"]
+        assert re.findall(r">About (\w+)</a>", browser.get(MINE).text) == ["soon", "apple", "zebra", "open", "closed"]
     finally:
         with web.store.transaction() as session:
             for name in ("zebra", "soon", "apple"):
