@@ -31,7 +31,7 @@ from service.store.people import lti
 from service.store.people.students import ensure_course
 from service.store.queue import jobs, self_tests
 from service.store.queue.jobs import RetryPolicy
-from service.store.states import CancelReason, CountedAttempt, JobState, Standing
+from service.store.states import CancelReason, CountedAttempt, JobState, ReleaseRule, Standing
 from service.store.tables.courses import Course
 from service.store.tables.grades import CriterionResultRow
 from service.store.tables.people import Enrolment
@@ -160,7 +160,8 @@ def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed:
     _set_rule(store, rule)
     with store.transaction() as session:
         ensure_course(session, "default", datetime.now(UTC))
-        policies.set_policy(session, 1, "", PolicyLimits(attempts=chance.choice([2, None])))
+        limits = PolicyLimits(attempts=chance.choice([2, None]), release=ReleaseRule.AT_ONCE)
+        policies.set_policy(session, 1, "", limits)
     first = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
     for number in range(20):
         match chance.choice(("submit", "end", "end", "mark", "quarantine")):
