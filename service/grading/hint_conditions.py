@@ -117,3 +117,29 @@ def check_colour_name(listing: Listing, statement: Statement) -> str:
             names=", ".join(_COLOUR_NAMES),
         )
     return ""
+
+
+def advise_on_leaving(listing: Listing, loop: Statement) -> str:
+    """Return how a loop ends when an answer is there: by its condition, if that names something, or by ``break``."""
+    body = listing.code.list_body(loop)
+    counters = {each.keyword for each in body if each.tokens[1:2] in (("+=",), ("-=",))}
+    variables = {each.target for each in listing.code.statements} - counters - {""}
+    names = [each for each in loop.condition if each in variables] if loop.keyword == "while" else []
+    if not names:
+        return Sentence(
+            "Leave the loop in line %(line)s as soon as the answer is there, for example with break", line=loop.line
+        )
+    changing_line = next((each.line for name in names for each in body if each.target == name), None)
+    if changing_line is None:
+        return Sentence(
+            "The loop in line %(line)s goes on while %(condition)s, and no line in it assigns a value to %(name)s",
+            line=loop.line,
+            condition=join_tokens(loop.condition),
+            name=names[0],
+        )
+    return Sentence(
+        "The loop in line %(line)s goes on while %(condition)s: check line %(other)s, which changes it",
+        line=loop.line,
+        condition=join_tokens(loop.condition),
+        other=changing_line,
+    )

@@ -287,9 +287,7 @@ def _list_numbers(listing: Listing, call: CallInCode) -> list[float]:
 
 def _describe_change(change: _Change, factor: float, failure: str) -> str:
     location = change.listing.locate(change.statement.line)
-    numbers = _list_numbers(change.listing, change.call) if change.call is not None else []
-    name = change.call.name.rpartition(".")[2] if change.call is not None else ""
-    amount = numbers[-1] if numbers and (len(numbers) == 1 or name in LIMITED_MOVES | {"sleep"}) else None
+    amount = _find_amount(change.listing, change.call) if change.call is not None else None
     if factor < 0:
         fix: str = Sentence("Let the robot move the other way here: change the sign of the speed or steering")
     elif amount:
@@ -303,6 +301,14 @@ def _describe_change(change: _Change, factor: float, failure: str) -> str:
             "Let the robot move about %(factor).2g times as far or turn as much here, less than now", factor=factor
         )
     return Sentence("%(place)s: %(problem)s. %(advice)s", place=location, problem=make_clause(failure), advice=fix)
+
+
+def _find_amount(listing: Listing, call: CallInCode) -> float | None:
+    """Return the number in a call that scales its motion: the last of a limited move or a wait, else the only one."""
+    if call.name.rpartition(".")[2] in LIMITED_MOVES | {"sleep"}:
+        return listing.code.number(call.arguments[-1]) if call.arguments else None
+    numbers = _list_numbers(listing, call)
+    return numbers[0] if len(numbers) == 1 else None
 
 
 def suggest_number(present: float, better: float) -> str:

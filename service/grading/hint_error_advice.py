@@ -243,6 +243,10 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             translatable("Give it one grey value for each pixel: take the mean of red, green and blue."),
         ),
         (
+            r"X has 14 features, but \w+ is expecting 196|X has 20 features, but \w+ is expecting 400",
+            translatable("The image still has rows. Make one row of it with .reshape(1, -1)."),
+        ),
+        (
             r"X has (\d+) features, but \w+ is expecting (?P<expected>\d+)",
             translatable(
                 "The network expects %(expected)s numbers for each image. Use images of the size that it was trained "

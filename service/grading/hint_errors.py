@@ -50,6 +50,7 @@ from service.grading.hint_value_sources import (
     advise_on_none,
     advise_on_percentage,
     advise_on_quoted_amount,
+    advise_on_unsent_message,
 )
 from service.grading.judging.message_parts import describe_fault, quote_text
 from service.language import translatable
@@ -376,6 +377,7 @@ _ADVISERS: Sequence[_Adviser] = (
     advise_on_mean_axis,
     advise_on_missing_alias,
     advise_on_sample_count,
+    advise_on_unsent_message,
     advise_on_text_operand,
     advise_on_quoted_amount,
     advise_on_list_operand,

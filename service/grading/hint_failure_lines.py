@@ -14,6 +14,7 @@ from service.grading.findings import ExtraText, LateResend, MissingAnswer, Other
 from service.grading.grade import Evidence
 from service.grading.hint_clues import Clues, F, Listing, name_cell
 from service.grading.hint_code import CallInCode, Statement, join_tokens
+from service.grading.hint_conditions import advise_on_leaving
 from service.grading.hint_counterfactuals import suggest_number
 from service.grading.hint_steering import describe_steering_mistake
 from service.grading.hint_structure import has_motor_call
@@ -23,6 +24,7 @@ from sim.recording import Recording
 from sim.recording_values import rebuild_floor
 from sim.sentences import Sentence, join_sentences, make_clause
 from submissions.criteria import Criterion
+from submissions.criteria.collecting import Collects
 from submissions.criteria.ending import EndPose
 from submissions.criteria.line import Follows, Laps
 from submissions.criteria.motion import Moves
@@ -217,10 +219,9 @@ def _hint_about_resending(failure: _Failure) -> str:
     loop = next((each for each in failure.listing.code.list_enclosing_loops(statement) if each is not statement), None)
     if failure.find_finding(LateResend) is not None and loop is not None:
         return Sentence(
-            "%(place)s sends the message again although its answer had come. Leave the loop in line %(line)s as soon "
-            "as the answer is there, for example with break below if messages:",
+            "%(place)s sends the message again although its answer had come. %(advice)s",
             place=failure.listing.locate(statement.line),
-            line=loop.line,
+            advice=advise_on_leaving(failure.listing, loop),
         )
     if failure.find_finding(MissingAnswer) is None:
         return ""
@@ -252,7 +253,9 @@ def _hint_about_other_sensor(failure: _Failure) -> str:
     is_mixed = any(each.has_token(required_property) for each in statements) and not (
         is_output and isinstance(failure.criterion, Reports)
     )
-    if not required_property or statement is None or is_mixed:
+    # A program asks for images by a text, whichever sensor it reads.
+    is_asked_by_text = isinstance(failure.criterion, Collects)
+    if not required_property or statement is None or is_mixed or is_asked_by_text:
         return ""
     return Sentence(
         "%(place)s reads %(other)s, but %(required)s is judged: %(problem)s. Write %(required)s",

@@ -264,6 +264,21 @@ def _hint_about_function_error(criterion: Functions, clues: Clues) -> str:
     return "" if fault.file else Sentence("%(place)s: %(problem)s", place=place, problem=error)
 
 
+def _find_inner_function(name: str, clues: Clues) -> str:
+    """Return a hint on a function that is defined inside another one; empty if there is none of this name."""
+    for listing in clues.responders:
+        for head in listing.code.list_functions():
+            outer = next((each for each in listing.code.list_enclosing(head) if each.keyword == "def"), None)
+            if head.tokens[1] == name and outer is not None:
+                return Sentence(
+                    "%(place)s defines %(name)s inside %(outer)s, so nothing else calls it. Move it to the left edge",
+                    place=listing.locate(head.line),
+                    name=name,
+                    outer=sanitise_name(outer.tokens[1]),
+                )
+    return ""
+
+
 def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
     functions = [
         (listing, head) for listing in clues.responders for head in listing.code.list_functions() if not head.indent
@@ -273,6 +288,9 @@ def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
         fault = _find_call_fault(criterion, clues)
         if fault is None or not is_kind(fault, FaultKind.MISSING_FUNCTION):
             return ""
+        inner = _find_inner_function(name, clues)
+        if inner:
+            return inner
         similar_names = difflib.get_close_matches(name, [head.tokens[1] for _, head in functions], 1, _MIN_SIMILARITY)
         listing, head = next(((one, each) for one, each in functions if each.tokens[1] in similar_names), (None, None))
         if listing is None or head is None:

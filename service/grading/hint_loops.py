@@ -268,11 +268,22 @@ def _describe_stale_reading(loop: Statement, body: Sequence[Statement], code: Co
             and statement.target not in assigned_names
             and any(one.has_token(statement.target) for one in body)
         ):
-            return _describe_single_reading(statement)
+            return _describe_single_reading(statement, body)
     return ""
 
 
-def _describe_single_reading(assignment: Statement) -> str:
+def _describe_single_reading(assignment: Statement, body: Sequence[Statement]) -> str:
+    """Return that a value is read once, or that the loop reads it again under a name with other capital letters."""
+    other = next((each for each in body if each.target.lower() == assignment.target.lower()), None)
+    if other is not None:
+        return Sentence(
+            "%(name)s is read once, in line %(line)s, and not again. Line %(other)s writes %(wrong)s: write %(name)s, "
+            "because capital and small letters differ",
+            name=assignment.target,
+            line=assignment.line,
+            other=other.line,
+            wrong=other.target,
+        )
     return Sentence(
         "%(name)s is read once, in line %(line)s, and not again. Repeat %(code)s in the loop",
         name=assignment.target,
@@ -358,7 +369,7 @@ def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeS
             (each for each in code.statements[: loop.number] if each.target == name and _is_reading(each)), None
         )
         if assignment is not None:
-            return _describe_single_reading(assignment)
+            return _describe_single_reading(assignment, code.list_body(loop))
     if len(names) == 1:
         return Sentence("%(name)s does not change in the loop. Assign %(name)s in the loop", name=names[0])
     return Sentence(

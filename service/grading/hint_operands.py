@@ -32,6 +32,8 @@ _MOTOR_KEYWORDS = (
     "brake",
     "block",
 )
+#: Functions of numpy that make one array of several, or of copies.
+_COPYING_FUNCTIONS = ("concatenate", "stack", "vstack", "repeat", "tile", "append")
 _DIGITS = re.compile(r"""["'](-?\d+(?:\.\d+)?)["']\Z""")
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
 #: Short names of modules, as the course's programs import them.
@@ -264,13 +266,19 @@ def advise_on_mean_axis(fault: Fault, _: Clues, listing: Listing | None, __: Sta
     return ""
 
 
-def advise_on_sample_count(fault: Fault, *_: object) -> str:
+def advise_on_sample_count(fault: Fault, _: Clues, __: Listing | None, statement: Statement | None) -> str:
     """Return advice on ``fit`` with more or fewer labels than images."""
     values = read_values(fault, FaultKind.SAMPLE_COUNTS)
     if values is None:
         return ""
     images, labels = int(values[0]), int(values[1])
     if images > labels > 0 and images % labels == 0:
+        if statement is not None and statement.has_token(*_COPYING_FUNCTIONS):
+            return Sentence(
+                "There are %(share)s rows for each label. Repeat the labels %(share)s times, too, for example with "
+                "np.tile(labels, %(share)s).",
+                share=images // labels,
+            )
         return Sentence(
             "There are %(rows)s rows for %(labels)s labels, so each image became %(share)s rows. Write "
             ".reshape(len(images), -1) for one row for each image.",

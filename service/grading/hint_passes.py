@@ -100,6 +100,14 @@ def hint_about_short_loop(clues: Clues) -> Iterator[str]:
         call = next((each for each in loop.calls if each.name == "range"), None)
         count = listing.code.number(call.arguments[0]) if call is not None and len(call.arguments) == 1 else None
         is_driving = any(has_motor_call(each, CONTINUOUS_MOVES) for each in listing.code.statements[: loop.number])
+        if count and is_driving and not any(_waits(each) for each in listing.code.list_body(loop)):
+            yield Sentence(
+                "%(place)s: the loop ends %(distance).0f mm before the middle of the area where the robot should end, "
+                "because it does not wait between its passes. Add a time.sleep to it",
+                place=listing.locate(loop.line),
+                distance=missing_way,
+            )
+            return
         if count and is_driving:
             yield Sentence(
                 "%(place)s: the loop ends %(distance).0f mm before the middle of the area where the robot "
@@ -110,6 +118,10 @@ def hint_about_short_loop(clues: Clues) -> Iterator[str]:
                 right=count * (1 + missing_way / covered_way),
             )
             return
+
+
+def _waits(statement: Statement) -> bool:
+    return any(each.name.rpartition(".")[2] in LIMITED_MOVES | {"sleep"} for each in statement.calls)
 
 
 def _is_multiple(tokens: tuple[str, ...], variable: str) -> bool:

@@ -5,6 +5,7 @@ They use the confusion matrix of the trials that the student may see.
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +27,8 @@ _ARGMAX = re.compile(r"\bargmax\b|\.index\(")
 _NETWORK = re.compile(r"\bload(?:_onnx|_weights)?\(|\bMLPClassifier\(|\bcnn_load\(")
 _TURN = re.compile(r"\w\.T\b|\btranspose\(|\brot90\(|\bflip(?:lr|ud)?\(|\[::-1\]")
 _MAX_ACCURACY = 0.5
+#: The least similarity of a misspelt name with its label, from 0 to 1.
+_MIN_SIMILARITY = 0.8
 _IMAGE = re.compile(r"IMG_DATA|[\"'](?:left|right)[\"']")
 #: A name from a list by a fixed number.
 _FIXED_NAME = re.compile(r"\b[^\W\d]\w*\[-?\d+\]\s*$")
@@ -35,6 +38,10 @@ def hint_about_recognition(clues: Clues) -> Iterator[str]:
     """Yield a hint for the first criterion that lost marks on images."""
     for result in (*clues.results, *(clues.practice if clues.lost else ())):
         accuracy = result.accuracy
+        misspelt = "" if accuracy is None else _hint_about_misspelt_label(result, accuracy, clues)
+        if misspelt:
+            yield misspelt
+            return
         if accuracy is None or accuracy.value > _MAX_ACCURACY + 0.2 or not accuracy.n:
             continue
         answers = {truth: answer for truth, answer, _ in accuracy.confusion if answer is not None}
@@ -115,6 +122,14 @@ def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
     if len(wrong_truths) < 3:
         return ""
     truth, answer = quote_text(wrong_truths[0]), quote_text(answers[wrong_truths[0]])
+    if not _has_prediction(clues):
+        return Sentence(
+            "%(place)s: names are exchanged: %(truth)s is called %(answer)s. Check the conditions that lead to these "
+            "names, and the values in them",
+            place=location,
+            truth=truth,
+            answer=answer,
+        )
     if len(wrong_truths) == len(answers):
         return Sentence(
             "%(place)s: every image gets another's name, so the names are shifted by one place or in another "
@@ -133,12 +148,17 @@ def _hint_about_label_order(answers: Mapping[str, str], clues: Clues) -> str:
 
 
 def _describe_labels_line(names: Sequence[str], clues: Clues) -> str:
-    """Return the first line with one of the names in quotes."""
+    """Return the first line with one of the names in quotes, or the one that asks the network."""
+    return _find_quoted(names, clues) or _describe_prediction_line(clues)
+
+
+def _find_quoted(names: Sequence[str], clues: Clues) -> str:
+    """Return the first line with one of the names in quotes; empty if there is none."""
     for listing in clues.responders:
         for number, line in enumerate(listing.lines, 1):
             if any(f'"{name}"' in line or f"'{name}'" in line for name in names):
                 return listing.locate(number)
-    return _describe_prediction_line(clues)
+    return ""
 
 
 def _describe_prediction_line(clues: Clues) -> str:
@@ -248,6 +268,14 @@ def _describe_fixed_line(name: str, clues: Clues) -> str:
         if line is not None or len(quoted) == 1:
             return listing.locate(quoted[0] if line is None else line)
     return ""
+
+
+def _hint_about_misspelt_label(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:
+    """Return a hint on a name in quotes that is nearly one of the labels, and is answered."""
+    unnamed = find_finding(result, UnnamedLabel)
+    similar = [] if unnamed is None else difflib.get_close_matches(unnamed.answer, accuracy.labels, 1, _MIN_SIMILARITY)
+    line = _find_quoted([unnamed.answer], clues) if unnamed is not None and similar else ""
+    return line and Sentence('%(place)s: write "%(label)s"', place=line, label=similar[0])
 
 
 def _hint_about_unknown_label(result: CriterionResult, accuracy: Accuracy, clues: Clues) -> str:

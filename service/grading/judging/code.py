@@ -325,6 +325,9 @@ def _compare_call(criterion: Functions, call: ExpectedCall, call_result: CallRes
     value = call_result.value
     if criterion.path is not None:
         value = find_at_path(parse_json_answer(value), criterion.path) if isinstance(value, str) else MISSING
+        if value is MISSING and not isinstance(call_result.value, str):
+            description = Sentence("it returned %(value)s, not a text of JSON", value=_format_value(call_result.value))
+            return Fraction(0), description, MISSING
         if value is MISSING:
             answer_text = quote_text(as_text(call_result.value))
             description = Sentence(

@@ -18,7 +18,7 @@ from jsonschema_rs import validator_for
 from starlette.testclient import TestClient
 
 import report_builders
-from builders import echo, grading_request
+from builders import echo, grading_request, release_at_once
 from service.operations import replies
 from service.store.batches import intake
 from service.store.courses import open_assignments
@@ -190,6 +190,7 @@ def test_whoever_asks_too_often_waits(tmp_path: Path) -> None:
 
 def test_a_student_sees_of_a_grade_what_is_released_and_staff_all_of_it(web: Web, grace: Program, ada: Program) -> None:
     job = graded(web)
+    release_at_once(web.store)
     whole = grace.ask("GET", f"/grades/{job}")
     mine = ada.ask("GET", "/mine/submissions/1/grade")
     assert whole.json()["trials"]
