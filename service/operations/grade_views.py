@@ -15,13 +15,14 @@ from service.plotting import load_own_floors
 from service.report_files import render_report_body, render_standalone_report
 from service.reports.html import ReportParts
 from service.reports.replay.document import build_grade_replay
-from service.reports.view import View, build_staff_view
+from service.reports.view import View, build_staff_view, build_student_view
 from service.store import audit
 from service.store.audit import AuditEntry
 from service.store.batches import batch_table, job_lines, regrade_changes, regrades, stored_requests
 from service.store.batches.changes import Change
 from service.store.batches.job_lines import JobLine
 from service.store.batches.regrades import GradingLine
+from service.store.courses import policies
 from service.store.courses.hidden_names import HiddenNames
 from service.store.grades import own_gradings, results
 from service.store.grades.own_gradings import OwnGrading
@@ -50,6 +51,14 @@ class GradeView:
     history: list[AuditEntry]
     awaits_approval: bool  # over a limit, and not graded until staff ask for it
     neighbours: Neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class StudentReport:
+    """A grade with the report that its student sees when it is published."""
+
+    line: JobLine
+    report: ReportParts
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +111,21 @@ def show_report(service: Service, actor: Actor, course_id: int, job_id: str, lan
     """Return the report of a grade as a standalone page. Raises NotFound, also before it is graded."""
     line, view = _load_result(service, actor, course_id, job_id, language)
     return render_standalone_report(service.store, line.id, line.plots, view)
+
+
+def show_student_report(
+    service: Service, actor: Actor, course_id: int, job_id: str, language: Language = ENGLISH
+) -> StudentReport:
+    """Return the report that the student sees of a published grade. Raises NotFound, also before it is graded."""
+    hidden_names = load_names_for_actor(service, actor, course_id)
+    with service.store.reading() as session:
+        _require_course_job(session, actor, course_id, job_id)
+        line = job_lines.load_job_line(session, job_id).hide_name(hidden_names)
+        if line.state is not JobState.DONE:
+            raise NotFound("There is no such page or item, or you have no access to it.")
+        named_grade = replace(results.load_grade(session, line.id), student=line.student)
+    view = build_student_view(named_grade, policies.PUBLISHED_VISIBILITIES, language)
+    return StudentReport(line, render_report_body(service.store, line.id, line.plots, view))
 
 
 def show_replay(service: Service, actor: Actor, course_id: int, job_id: str) -> dict[str, Any]:

@@ -26,6 +26,8 @@ from service.store.tables.submissions import Job, SubmissionRow
 _ALWAYS = frozenset({"visible"})
 _AFTER_DUE_DATE = frozenset({"after_due_date"})
 _WITH_PUBLICATION = _AFTER_DUE_DATE | {"after_published"}
+#: The visibilities that students see of a published grade.
+PUBLISHED_VISIBILITIES = _ALWAYS | _WITH_PUBLICATION
 _UNCOUNTED_VERDICTS = ("assignment_error", "host_error")
 
 

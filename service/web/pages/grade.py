@@ -50,6 +50,22 @@ def show_grade(
     )
 
 
+@router.get("/as-student")
+def show_as_student(request: Request, access: CourseInstructor, context: Context, job_id: RowName) -> Response:
+    """Show the report that the student sees when the grade is published."""
+    language = detect_language(request)
+    student_report = grade_views.show_student_report(context.service, access.actor, access.course_id, job_id, language)
+    return render_page(
+        request,
+        access.reader,
+        "grade_as_student.html",
+        access=access,
+        line=student_report.line,
+        path=f"/courses/{access.course_id}/grades/{job_id}",
+        report=student_report.report,
+    )
+
+
 @router.post("/publish")
 def publish(
     access: CourseInstructor, context: Context, job_id: RowName, anyway: Annotated[bool, Form()] = False

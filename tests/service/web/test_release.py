@@ -244,3 +244,23 @@ def test_a_student_is_told_before_they_submit_that_a_worse_or_late_attempt_count
     assert "Your current grade is from attempt 1: 3 of 4 marks." in words(web.browser(ada).get(page).text)
     _set(web, PolicyLimits(datetime.now(UTC) + _PAST, late_days=2))
     assert "A new submission is late." in words(web.browser(ada).get(page).text)
+
+
+def test_staff_see_beforehand_what_the_student_will_see(web: Web, ada: Member) -> None:
+    grade = report_builders.faulty_grade()
+    (first, *_) = grade.criteria
+    later = replace(first, id="later", title="Opens with publication", visibility="after_published")
+    hidden = replace(first, id="hidden", title="Never opens", visibility="hidden")
+    request = grading_request("ada")
+    accepted = intake.accept_new_submissions(web.store, "week one", [request], (), course=COURSE, max_attempts=1)
+    grade_all(web, replace(grade, criteria=(first, later, hidden)))
+    assert accepted.batch is not None
+    grace, path = web.browser(web.instructor()), f"/courses/1/grades/{accepted.batch.jobs[0].job_id}"
+    beforehand = words(grace.get(f"{path}/as-student").text)
+    assert "The student sees this report when you publish the grade." in beforehand
+    assert ("Opens with publication" in beforehand, "Never opens" in beforehand) == (True, False)
+    acting.publish(web.store, accepted.batch.id, actor="grace")
+    seen = words(web.browser(ada).get(f"{MINE}/submissions/1").text)
+    assert ("Opens with publication" in seen, "Never opens" in seen) == (True, False)
+    assert "The student sees this report." in words(grace.get(f"{path}/as-student").text)
+    assert web.browser(ada).get(f"{path}/as-student").status_code == 404
