@@ -102,8 +102,8 @@ def hint_about_short_loop(clues: Clues) -> Iterator[str]:
         is_driving = any(has_motor_call(each, CONTINUOUS_MOVES) for each in listing.code.statements[: loop.number])
         if count and is_driving and not any(_waits(each) for each in listing.code.list_body(loop)):
             yield Sentence(
-                "%(place)s: the loop ends %(distance).0f mm before the middle of the area where the robot should end, "
-                "because it does not wait between its passes. Add a time.sleep to it",
+                "%(place)s: the loop does not wait between its passes, and ends %(distance).0f mm before the middle of "
+                "the area. Add a time.sleep to it",
                 place=listing.locate(loop.line),
                 distance=missing_way,
             )

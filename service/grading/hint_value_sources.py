@@ -192,7 +192,7 @@ def advise_on_percentage(fault: Fault, _: Clues, __: Listing | None, statement: 
 def advise_on_unsent_message(fault: Fault, clues: Clues, _: Listing | None, statement: Statement | None) -> str:
     """Return advice on an empty queue of a program that prints texts, but sends none of them."""
     is_queue = statement is not None and statement.has_token("pyState")
-    if not fault.message.startswith("IndexError") or not is_queue or clues.sent or not clues.printed:
+    if fault.who != "program" or not is_queue or clues.sent or not clues.printed:
         return ""
     return Sentence(
         'The robot sent nothing, so no answer came. A message begins with PY::, as in print("PY::" + text).'

@@ -188,7 +188,7 @@ def test_the_page_names_the_limits_of_a_submission(web: Web, ada: Member) -> Non
         with web.store.transaction() as session:
             open_assignments.close_assignment(session, 1, echo().id)
         closed = browser.get(TRY)
-        assert "This assignment is closed." in closed.text
+        assert "This assignment was closed on" in closed.text
         assert (closed.status_code, "<textarea" in closed.text) == (200, False)
     finally:
         with web.store.transaction() as session:
