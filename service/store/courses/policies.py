@@ -224,10 +224,10 @@ def match_released(
 
     It says nothing of the criteria that open later, nor of limits: ``current_grades`` has the other conditions.
     """
-    course_id = select(Enrolment.course_id).where(Enrolment.id == submission.enrolment_id).scalar_subquery()
-    is_applicable = (Policy.course_id == course_id, Policy.assignment.in_(("", submission.assignment)))
+    is_applicable = (Enrolment.id == submission.enrolment_id, Policy.assignment.in_(("", submission.assignment)))
+    course_policies = select(Policy.id).join(Enrolment, Enrolment.course_id == Policy.course_id).where(*is_applicable)
     # The policy of the assignment, or the default, whose assignment is empty and comes last.
-    policy_id = select(Policy.id).where(*is_applicable).order_by(Policy.assignment.desc()).limit(1)
+    policy_id = course_policies.order_by(Policy.assignment.desc()).limit(1)
     policy = Policy.id == policy_id.correlate(submission).scalar_subquery()
     rule = func.coalesce(select(Policy.release).where(policy).scalar_subquery(), ReleaseRule.OWN_AT_ONCE)
     batch_of_own = exists().where(OpenAssignment.batch_id == submission.batch_id)

@@ -13,14 +13,17 @@ import pytest
 
 import acting
 import report_builders
-from builders import PROGRAM, echo, grading_request
+from builders import PROGRAM, echo, grading_request, prepared
 from rows import quick_first
+from service.operations import own_submissions
 from service.store.batches import intake
 from service.store.courses import open_assignments, policies
 from service.store.courses.assignment_versions import freeze_assignment
 from service.store.courses.policies import PolicyLimits
+from service.store.engine import Store
 from service.store.grades.appeals import can_appeal
 from service.store.people.membership import Member
+from service.store.queue import jobs
 from service.store.states import CountedAttempt, ReleaseRule
 from service.store.tables.courses import Course
 from service.store.tables.submissions import Job
@@ -142,6 +145,26 @@ def test_the_policy_of_the_assignment_replaces_the_default_completely(web: Web, 
     assert _read_secrets(web, ada)
     _set(web, PolicyLimits(attempts=3))
     assert _read_secrets(web, ada) == []
+
+
+@pytest.mark.parametrize("first", [ReleaseRule.AT_ONCE, ReleaseRule.PUBLISHED])
+def test_each_course_has_its_own_policy(store: Store, first: ReleaseRule) -> None:
+    second = ReleaseRule.PUBLISHED if first is ReleaseRule.AT_ONCE else ReleaseRule.AT_ONCE
+    for course, who in (("one", "ada"), ("two", "bob"), ("one", "cid")):
+        intake.accept_batch(store, "week one", [grading_request(who)], (), course=course, max_attempts=1)
+        claim = jobs.claim_job(store, "worker", 60)
+        assert claim is not None
+        jobs.finish_job(store, claim, prepared(report_builders.faulty_grade()), datetime.now(UTC))
+    with store.transaction() as session:
+        for course_id, rule in ((1, first), (2, second)):
+            policies.set_policy(session, course_id, "", PolicyLimits(release=rule))
+    with store.reading() as session:
+        seen = [can_appeal(session, submission_id) for submission_id in (1, 2, 3)]
+        shown = [
+            own_submissions.load_own_attempts(session, enrolment_id, ASSIGNMENT).newest[0].shown
+            for enrolment_id in (1, 2, 3)
+        ]
+    assert seen == shown == [rule is ReleaseRule.AT_ONCE for rule in (first, second, first)]
 
 
 @pytest.mark.parametrize("unseen_marks", [0, 4])
