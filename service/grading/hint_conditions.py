@@ -1,6 +1,6 @@
 """Slips in conditions that the text proves: always true, never true, or a method without its brackets.
 
-``hint_slips.py`` runs these rules with its own.
+``hint_slips.py`` runs these rules with its own. ``advise_on_leaving`` says how the condition of a loop becomes false.
 """
 
 from __future__ import annotations

@@ -119,10 +119,7 @@ def show_student_report(
     """Return the report that the student sees of a published grade. Raises NotFound, also before it is graded."""
     hidden_names = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        _require_course_job(session, actor, course_id, job_id)
-        line = job_lines.load_job_line(session, job_id).hide_name(hidden_names)
-        if line.state is not JobState.DONE:
-            raise NotFound("There is no such page or item, or you have no access to it.")
+        line = _load_graded_line(session, actor, course_id, job_id, hidden_names)
         named_grade = replace(results.load_grade(session, line.id), student=line.student)
     view = build_student_view(named_grade, policies.PUBLISHED_VISIBILITIES, language)
     return StudentReport(line, render_report_body(service.store, line.id, line.plots, view))
@@ -172,11 +169,18 @@ def _load_result(
 ) -> tuple[JobLine, View]:
     hidden_names: HiddenNames = load_names_for_actor(service, actor, course_id)
     with service.store.reading() as session:
-        _require_course_job(session, actor, course_id, job_id)
-        line = job_lines.load_job_line(session, job_id).hide_name(hidden_names)
-        if line.state is not JobState.DONE:
-            raise NotFound("There is no such page or item, or you have no access to it.")
+        line = _load_graded_line(session, actor, course_id, job_id, hidden_names)
         return line, _load_staff_view(session, line, language)
+
+
+def _load_graded_line(
+    session: Session, actor: Actor, course_id: int, job_id: str, hidden_names: HiddenNames
+) -> JobLine:
+    _require_course_job(session, actor, course_id, job_id)
+    line = job_lines.load_job_line(session, job_id).hide_name(hidden_names)
+    if line.state is not JobState.DONE:
+        raise NotFound("There is no such page or item, or you have no access to it.")
+    return line
 
 
 def _load_staff_view(session: Session, line: JobLine, language: Language) -> View:

@@ -53,7 +53,7 @@ class _Rejection:
 
 @router.get("/courses/{course_id}/mine")
 def list_own_assignments(request: Request, access: CourseStudent, context: Context) -> Response:
-    """Show the open assignments and the student's submissions."""
+    """Show the assignments of the course, with the student's newest submissions and rejected files."""
     work = own_views.show_work(context.service, access.actor, access.course_id)
     return render_page(
         request,
