@@ -22,6 +22,7 @@ from benchmarks import (
     grading,
     growth,
     memory,
+    notebook_cells,
     original,
     plots,
     pools,
@@ -55,6 +56,7 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "claims": claims.measure,
         "queue": queue.measure,
         "web": web.measure,
+        "notebook_cells": notebook_cells.measure,
     }
 )
 #: The groups of ``--quick``, which together take less than a minute.

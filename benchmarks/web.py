@@ -7,33 +7,29 @@ from __future__ import annotations
 
 import http.client
 import random
-import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import timedelta
-from pathlib import Path
 
 from sqlalchemy import func, select
 
 from benchmarks import many_rows
 from benchmarks.graded_store import ASSIGNMENT, build_short_request, create_graded_batch
 from benchmarks.harness.postgresql_server import PostgresqlServer, create_database
+from benchmarks.harness.running_service import start_service
 from benchmarks.measurement import COUNT, MILLISECONDS, SECONDS, Measurement, median
-from service.queue.supervisor import Supervisor
-from service.settings import load_settings
 from service.store.courses import open_assignments
 from service.store.courses.assignment_versions import freeze_assignment
-from service.store.engine import Store, open_store
+from service.store.engine import Store
 from service.store.people import credentials, membership
 from service.store.people.students import DEFAULT_COURSE
 from service.store.queue.metrics import compute_quantile
 from service.store.states import CredentialKind, JobState
 from service.store.tables.submissions import Job
 from service.web.access import CSRF_HEADER, SESSION_COOKIE, derive_csrf_token
-from service.web.listening_sockets import listen
 from submissions.assignment.reader import find_assignment
 from submissions.student_identity import Student
 
@@ -87,7 +83,7 @@ def measure(times: int) -> list[Measurement]:
 
 def _measure_page(server: PostgresqlServer, times: int) -> list[Measurement]:
     with ExitStack() as stack:
-        store, port = _start_service(stack, server, workers=1)
+        store, port = start_service(stack, create_database(server.url), workers=1)
         many_rows.fill(store, create_graded_batch(store))
         with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
             connection.exec_driver_sql("VACUUM ANALYZE")
@@ -114,7 +110,7 @@ def _create_instructor(store: Store) -> int:
 
 def _measure_class(server: PostgresqlServer) -> list[Measurement]:
     with ExitStack() as stack:
-        store, port = _start_service(stack, server, workers=2)
+        store, port = start_service(stack, create_database(server.url), workers=2)
         names = [f"student-{number}" for number in range(_STUDENTS)]
         with store.transaction() as session:
             members = [membership.make_student(session, DEFAULT_COURSE, Student(name)).person_id for name in names]
@@ -148,23 +144,6 @@ def _measure_class(server: PostgresqlServer) -> list[Measurement]:
         Measurement(f"{title}: lost", lost_count, COUNT, 0),
         Measurement(f"{title}: the last is graded after", last_seconds, SECONDS),
     ]
-
-
-def _start_service(stack: ExitStack, server: PostgresqlServer, workers: int) -> tuple[Store, int]:
-    """Yield the service on an empty database when it is ready, with the port of its web server."""
-    folder = stack.enter_context(tempfile.TemporaryDirectory())
-    settings = load_settings(home=Path(folder), database_url=create_database(server.url), concurrency=1)
-    store = stack.enter_context(open_store(settings))
-    listener = stack.enter_context(listen("127.0.0.1", 0))
-    service = stack.enter_context(Supervisor(settings, store, workers, listener))
-    service.ensure()
-    start = time.monotonic()
-    while not service.is_ready:
-        if time.monotonic() - start > _PATIENCE_SECONDS:
-            raise RuntimeError("the service does not come up")
-        time.sleep(0.1)
-    port: int = listener.getsockname()[1]
-    return store, port
 
 
 def _create_session(store: Store, person_id: int) -> str:
