@@ -119,6 +119,7 @@ def test_each_thing_has_an_example() -> None:
 _QUICK = ("criterion", "output format", "setting", "table and its migration")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "added", [pytest.param(name, marks=[pytest.mark.long] * (name not in _QUICK)) for name in sorted(TRIED)]
 )

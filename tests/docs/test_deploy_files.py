@@ -56,6 +56,7 @@ def test_every_variable_is_a_setting(file: Path) -> None:
     assert set(re.findall(r"\b\w*CREDENTIALS\w*", file.read_text())) <= {SECRET_FILES}
 
 
+@pytest.mark.long
 def test_every_command_is_one_with_these_options() -> None:
     for command in sorted({tuple(words) for words in _commands()}):
         assert command[0] == "robomark"

@@ -77,6 +77,7 @@ _SHOWING = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("document", _SHOWING)
 def test_every_command_shown_runs(document: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "my-work")

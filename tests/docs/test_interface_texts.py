@@ -41,6 +41,7 @@ def test_texts_of_the_interface_are_short_except_the_listed_ones() -> None:
     assert sorted(listed - long) == [], "listed, but no longer used"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", _QUOTING)
 def test_a_label_in_italics_is_one_of_the_interface(page: str) -> None:
     prose = re.sub(r"```.*?```|`[^`\n]*`", "", (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"), flags=re.S)

@@ -100,6 +100,7 @@ def bars() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return images.reshape(400, -1), np.arange(400) % 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("file", "plan"),
     [

@@ -216,6 +216,7 @@ def test_no_digit_of_a_sheet_is_trained_on(handwriting: tuple[np.ndarray, np.nda
     assert np.array_equal(trained, images[first])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("background", "paper"), [("MNIST_Digits", 255), ("MNIST_Digits_Black", 0)])
 @pytest.mark.parametrize(("dx", "dy"), [(2, -1), (-3, 3)])
 def test_training_images_are_what_the_sensor_would_see(

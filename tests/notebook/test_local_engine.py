@@ -123,6 +123,7 @@ def test_a_responder_cannot_start_another_run(engine: LocalEngine) -> None:
     assert engine.call_magic(call(PROGRAM), None, nested).run is not None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_an_engine_that_is_killed_in_the_middle_is_one_sentence_and_starts_again(
     engine: LocalEngine, number: signal.Signals

@@ -101,6 +101,7 @@ def _notebook() -> bytes:
     return json.dumps(document(cells)).encode()
 
 
+@pytest.mark.long
 def test_a_run_has_the_hash_of_robomark_run_with_the_same_answers(
     engine: ServerEngine, tmp_path: Path, runner: TrialRunner
 ) -> None:

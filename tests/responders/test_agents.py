@@ -200,6 +200,7 @@ FAILING = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", FAILING)
 def test_one_that_fails_stops_no_other_and_its_fault_has_its_name(how: str, runner: TrialRunner) -> None:
     parser, verdict, why = FAILING[how]

@@ -43,6 +43,7 @@ def test_program_and_world_agree_on_when_a_value_is_new(runner: TrialRunner) -> 
     assert recording.sha256 == run(runner, f"tank_turn.on(100, 20)\n{program}").sha256
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tick", [TICK, BROWSER_TICK])
 @pytest.mark.parametrize("seconds", [1, 1.02, 1.025])
 @pytest.mark.parametrize(

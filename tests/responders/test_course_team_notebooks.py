@@ -46,6 +46,7 @@ def in_order(wanted: list[str], text: str) -> list[str]:
     return missing
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "folder",
     [

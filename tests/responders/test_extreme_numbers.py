@@ -66,6 +66,7 @@ _LONG = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "call", [pytest.param(call, marks=[pytest.mark.long] * call.startswith(_LONG)) for call in _CALLS]
 )

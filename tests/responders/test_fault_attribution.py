@@ -99,6 +99,7 @@ def plain_runner() -> Iterator[TrialRunner]:
         yield made
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_child_that_is_killed_from_outside_is_run_again(times: int, plain_runner: TrialRunner) -> None:
     undisturbed = run_program(plain_runner, BUSY, responder=ECHO)
@@ -242,6 +243,7 @@ def test_naps_in_all_trials_together_are_counted(runner: TrialRunner) -> None:
     assert meter.spent.sleep_seconds < 2.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "responder",
     [

@@ -216,6 +216,7 @@ def _spec() -> TrialSpec:
     )
 
 
+@pytest.mark.long
 @given(frames=_sequences(wire.ROBOT))
 @settings(max_examples=60)
 def test_of_a_robot_program(
@@ -230,6 +231,7 @@ def test_of_a_robot_program(
     assert len(pickle.dumps((kept, fault))) < 2 * BUDGET
 
 
+@pytest.mark.long
 @given(frames=_sequences(wire.RESPONDER))
 @settings(max_examples=60)
 def test_of_a_responder(frames: list[bytes], tmp_path_factory: pytest.TempPathFactory) -> None:
@@ -262,6 +264,7 @@ class _NoRuns:
         return PlannedRun()
 
 
+@pytest.mark.long
 @given(frames=_sequences(wire.NOTEBOOK))
 @settings(max_examples=60)
 def test_of_a_notebook(

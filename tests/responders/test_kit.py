@@ -474,6 +474,7 @@ def test_a_network_with_its_weights_in_another_file_is_refused(
         importlib.import_module("nn_tools").load_onnx(tmp_path / "net.onnx")
 
 
+@pytest.mark.long
 def test_the_kit_needs_nothing_of_ours_and_nothing_that_draws() -> None:
     loads = "; ".join(f"import {name}" for name in KIT_MODULES)
     code = f"import sys; sys.path.insert(0, {str(KIT)!r}); {loads}; print(*{{n.split('.')[0] for n in sys.modules}})"

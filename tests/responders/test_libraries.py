@@ -77,6 +77,7 @@ def test_dates_are_of_one_type(tmp_path: Path, runner: TrialRunner) -> None:
     assert "\n[]" in of_notebook(tmp_path, runner, DATES).responder_output
 
 
+@pytest.mark.long
 def test_libraries_work_in_a_robot_program_as_in_a_responder(runner: TrialRunner) -> None:
     (output,) = of_program(runner, LIBRARIES)
     assert output.startswith("a 2020 (2, 3) 0.")

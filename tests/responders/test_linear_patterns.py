@@ -77,6 +77,7 @@ def _apply(pattern: re.Pattern[Any], method: str, text: str) -> None:
 PATTERNS = _list_patterns()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(PATTERNS.keys() - _BOUNDED))
 def test_pattern_takes_linear_time_on_repeated_fragments(name: str) -> None:
     pattern, methods = PATTERNS[name]

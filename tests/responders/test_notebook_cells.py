@@ -66,6 +66,7 @@ def test_the_report_says_which_cell_is_marked(tmp_path: Path, runner: TrialRunne
     assert graded(tmp_path, runner, cells).notes[0] == note.format(name="ada.ipynb")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cell", "note"),
     [
@@ -164,6 +165,7 @@ def test_no_responder_is_a_fault_with_the_cell_that_may_be_why(tmp_path: Path, r
     assert fault.hint.startswith("In cell 1, line 1: ModuleNotFoundError: No module named 'torch': numpy, pandas,")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cell", "verdict", "words"),
     [

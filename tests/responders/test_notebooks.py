@@ -38,6 +38,7 @@ def messaging(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "cell", "marks"),
     [
@@ -111,6 +112,7 @@ def run_in(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_run_prints_what_cells_print_around_the_robots_that_they_start(tmp_path: Path) -> None:
     robot = "%%sim_magic_preloaded -R\nsay('{}')"
     cells = [
@@ -127,6 +129,7 @@ def test_run_prints_what_cells_print_around_the_robots_that_they_start(tmp_path:
     assert places == sorted(places)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("tick", "end"), [("thirtieth", "1.11 s  end"), pytest.param("browser", "1.10 s  end", marks=pytest.mark.long)]
 )

@@ -86,6 +86,7 @@ def test_image_parser_says_which_kind(runner: TrialRunner) -> None:
     assert image.startswith("Py saw: {'typ': 'IMG_DATA', 'obj': {'left': '245,226,225,255,")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["shape_responder", "rule_responder"])
 @pytest.mark.parametrize("code", range(6))
 def test_shapes_are_named_in_the_courses_poses_and_a_millimetre_off(runner: TrialRunner, name: str, code: int) -> None:
@@ -130,6 +131,7 @@ def test_the_library_gives_only_its_own_files() -> None:
         library.source("../kit/nn_tools/sensor_data")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["digit_responder", "plain_digit_responder"])
 def test_digits_of_a_sheet_are_named(runner: TrialRunner, name: str) -> None:
     right = 0

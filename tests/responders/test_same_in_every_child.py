@@ -138,6 +138,7 @@ def recorded_answers(tmp_path_factory: pytest.TempPathFactory) -> tuple[bool, di
     return fixed, answers
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_is_the_same_in_two_fresh_zygotes_and_in_the_next_child(
     kind: str, recorded_answers: tuple[bool, dict[str, list[list[Any]]]]

@@ -50,6 +50,7 @@ def graded(folder: Path, runner: TrialRunner) -> Grade:
 _LARGE = "weights-of-two-gigabytes"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.long] * (name == _LARGE)) for name in sorted(EXPECTED)]
 )

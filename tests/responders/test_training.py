@@ -68,6 +68,7 @@ def test_training_without_images_says_that_there_are_none(runner: TrialRunner, t
     assert "image_data" in fault.hint
 
 
+@pytest.mark.long
 def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunner) -> None:
     assignment = find_assignment("train-a-recogniser")
     kept = tuple(replace(each, trials=1) for each in assignment.scenarios if each.id != "unseen-with-noise")
@@ -81,6 +82,7 @@ def test_the_accuracy_of_a_grade_is_that_of_the_marked_images(runner: TrialRunne
     assert "practice" not in describe_accuracy(result)
 
 
+@pytest.mark.long
 def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: TrialRunner, training: Assignment) -> None:
     result = trained(runner, training, NEAREST)
     learnt, unseen = result.trials
@@ -100,6 +102,7 @@ def test_a_model_is_trained_on_some_trials_and_marked_on_the_others(runner: Tria
     assert other.trials[1].recording.sha256 != unseen.recording.sha256
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "verdict", "sentence"),
     [

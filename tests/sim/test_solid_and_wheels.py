@@ -112,6 +112,7 @@ def random_drive(seed: int) -> Iterator[tuple[float, float]]:
         yield speeds[0], speeds[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["Default_Robot", "Small_Robot"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rigid_wheels_stay_within_a_fifth_of_a_percent_of_the_path(name: str, seed: int) -> None:

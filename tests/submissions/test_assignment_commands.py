@@ -134,6 +134,7 @@ def test_the_check_of_a_reference_that_fails_says_with_what(tmp_path: Path, runn
     assert any("NameError: name 'tank_drvie' is not defined (line 1)" in problem for problem in problems)
 
 
+@pytest.mark.long
 def test_an_assignment_whose_own_check_fails_on_an_example_is_not_in_order(tmp_path: Path, runner: TrialRunner) -> None:
     """Even if this costs no marks."""
     create_assignment(tmp_path / "task")
@@ -219,6 +220,7 @@ def test_answers_that_most_poses_share_are_warned_of() -> None:
     assert 'black-or-grey: criterion "says": one entry of expected fits 3 of the 5 poses' in ended.stderr
 
 
+@pytest.mark.long
 def test_what_new_examples_got_is_noted_and_nothing_that_stands_there_is_changed(tmp_path: Path) -> None:
     create_assignment(tmp_path / "task")
     file, old = tmp_path / "task" / "expected.toml", '# By hand.\n[stops-short]\nmarks = "3"\n'

@@ -174,6 +174,7 @@ def test_every_example_is_marked_as_expected(
     assert any(example.marks is not None and example.marks < full for example in checked.examples[1:])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(FAILING))
 def test_failing_submission_gets_a_verdict_or_one_sentence(name: str, runner: TrialRunner) -> None:
     wanted = FAILING[name]
@@ -237,6 +238,7 @@ def sought(criterion: Criterion) -> bool:
     return not (criterion.last or any_text)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("assignment", list_catalogue_ids())
 def test_naming_everything_earns_less_than_a_third_of_each_criterion_that_looks_among_much(assignment: str) -> None:
     graded_assignment = [criterion for criterion in find_assignment(assignment).criteria if sought(criterion)]

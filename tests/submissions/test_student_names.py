@@ -118,6 +118,7 @@ def test_in_a_batch_neither_of_two_who_are_alike_is_taken_in(
     assert all("cannot be distinguished from" in each or "too, and not the same" in each for each in _refused(checked))
 
 
+@pytest.mark.long
 @PAIRS
 def test_nobody_takes_the_place_of_who_is_in_the_course(tmp_path: Path, store: Store, ada: str, eve: str) -> None:
     """Refused in a later batch, except spellings that normalise to the same name."""

@@ -202,6 +202,7 @@ def _honest(runner: TrialRunner) -> Recording:
     return run_program(runner, HONEST_PROGRAM, responder=HONEST_RESPONDER)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("abuse", ABUSES, ids=lambda abuse: f"{abuse.role}: {abuse.name}")
 def test_it_ends_at_its_limit_and_the_next_runs_well(abuse: Abuse, abused: TrialRunner) -> None:
     before = _honest(abused)

@@ -289,6 +289,7 @@ def _assert_leaves_something(attack: Attack, sandbox: Isolation, tree: Path) -> 
     raise AssertionError(outcomes)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a file system that numbers files on and on")
 def test_numbers_are_left_out_where_they_go_on(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The sandbox lets everyone create a few files, so every trial has to use up the same amount of inode numbers."""

@@ -82,6 +82,7 @@ def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
     _says(sandboxes, empty, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "expected_output"),
     [
@@ -142,6 +143,7 @@ def test_it_works(text: str, expected_output: list[str], sandboxes: Sandboxes, f
     _says(sandboxes, folder, text, expected_output)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("role", quick_first(["robot", "responder with libraries", "responder"], 2))
 def test_the_standard_library_can_be_imported_late(role: ChildRole, sandboxes: Sandboxes, empty: Path) -> None:
     """Covers every importable module of the standard library, except those that draw or need a display."""

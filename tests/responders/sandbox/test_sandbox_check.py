@@ -71,6 +71,7 @@ def _number_of_the_zygote(sandboxes: Sandboxes) -> int:
     return int(output[0])
 
 
+@pytest.mark.long
 def test_a_trial_is_the_same_inside_bubblewrap_and_out() -> None:
     program = "from random import random\nfor _ in range(3): print(f'PY::{random()}')"
     responder = "import os, numpy as np\ndef responder(text): return f'{np.random.rand()} {sorted(os.environ)}'"

@@ -60,6 +60,7 @@ def test_a_zygote_that_is_closed_before_its_first_child_ends_silently(
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("program", "responder"),
     [
@@ -97,6 +98,7 @@ def test_nothing_outlives_what_it_hangs_on(killed: str, program: str, responder:
         worker.wait()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("who", ["it", "what is round it"])
 def test_a_killed_zygote_is_our_fault_so_the_trial_is_run_again(who: str) -> None:
     others = _zygotes(os.getpid())

@@ -96,6 +96,7 @@ def test_no_secret_is_in_anything_that_comes_back(paths: list[str]) -> None:
         assert secret.encode() not in came_back
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("role", ["program", "responder"])
 def test_the_next_student_sees_nothing_of_the_last(role: str) -> None:
     """The first student leaves a mark in memory, in modules, in built-in functions and in files."""

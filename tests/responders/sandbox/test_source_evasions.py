@@ -78,6 +78,7 @@ def graded(case: dict[str, Any], folder: Path, runner: TrialRunner) -> Grade:
 
 
 # Cases that remove the same modules are adjacent, so that they share a zygote.
+@pytest.mark.long
 @pytest.mark.parametrize(
     "case", [pytest.param(case, id=case["name"]) for case in sorted(CASES, key=lambda case: str(case.get("avoids")))]
 )
@@ -139,6 +140,7 @@ def f(): return hasattr(SourcelessFileLoader("x", nn_tools.__path__[0] + "/__pyc
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("module", "marks"), [("nn_tools.weights", 0), ("sklearn", 1)])
 def test_what_was_compiled_of_a_closed_file_is_closed_too(
     module: str, marks: int, tmp_path: Path, runner: TrialRunner

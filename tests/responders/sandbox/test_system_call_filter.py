@@ -87,6 +87,7 @@ def _arguments(everything: bool) -> list[list[int]]:
     return argument_lists
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(601))
 def test_each_call_is_decided_as_listed(number: int) -> None:
     name, decision = CALLS.get(number, (str(number), "EPERM"))

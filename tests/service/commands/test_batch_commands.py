@@ -42,6 +42,7 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended, Path]
     return home, ended, reports
 
 
+@pytest.mark.long
 def test_a_batch_is_of_the_course_that_is_named_and_listed_there(tmp_path: Path) -> None:
     folder = tmp_path / "class"
     shutil.copytree(locate_examples("echo-responder") / "flawed", folder / "ada")
@@ -79,6 +80,7 @@ def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, 
     assert not (home / "run" / "valkey.sock").exists()
 
 
+@pytest.mark.long
 def test_status_list_and_export_agree(graded: tuple[Path, Ended, Path]) -> None:
     home, ended, _ = graded
     batch = _batch_id(ended)
@@ -151,6 +153,7 @@ def test_backup_is_a_whole_database(graded: tuple[Path, Ended, Path], tmp_path: 
     assert (again.status, "exists already" in again.err) == (2, True)
 
 
+@pytest.mark.long
 def test_a_stopped_wait_gives_back_what_was_begun(tmp_path: Path) -> None:
     own = tmp_path / "class" / "spinner"
     shutil.copytree(locate_examples("echo-responder") / "reference", own)
@@ -177,6 +180,7 @@ def _running(home: Path) -> int:
         return session.scalar(running) or 0
 
 
+@pytest.mark.long
 def test_doctor_is_well_here_and_names_what_is_not(tmp_path: Path) -> None:
     well = robomark(tmp_path, "doctor")
     assert well.status == 0, well

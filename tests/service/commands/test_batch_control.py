@@ -55,6 +55,7 @@ def _batch(ended: Ended) -> str:
     return match[1]
 
 
+@pytest.mark.long
 def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Path, Path, Ended]) -> None:
     home, roster, ended = graded
     assert ended.status == 2
@@ -75,6 +76,7 @@ def test_a_roster_is_graded_and_the_same_again_changes_nothing(graded: tuple[Pat
     assert len(robomark(home, "batch", "list").out.strip().splitlines()) == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", [name for name, form in FORMATS.items() if form.document is not None])
 def test_a_file_for_each_submission(graded: tuple[Path, Path, Ended], tmp_path: Path, form: str) -> None:
     home, _, ended = graded
@@ -202,6 +204,7 @@ def test_a_changed_assignment_is_regraded_shown_and_published_when_told(
     assert (doubted.status, "does not match its regrade" in doubted.err) == (3, True)
 
 
+@pytest.mark.long
 def test_a_policy_and_an_extension_are_said_back(tmp_path: Path) -> None:
     assert "no policy" in robomark(tmp_path, "course", "policy").out
     set_ = robomark(tmp_path, "course", "policy", "--due", "2026-11-30", "--attempts", "2", "--late-days", "1")

@@ -96,6 +96,7 @@ def test_every_flag_of_the_magic_is_taken(tmp_path: Path) -> None:
     assert ended.stdout.rstrip().endswith("; completed")
 
 
+@pytest.mark.long
 def test_text_is_printed_whatever_the_locale(tmp_path: Path) -> None:
     program = tmp_path / "robot.py"
     program.write_text('print("robot \\U0001f916")')
@@ -188,6 +189,7 @@ def test_the_shell_completes_commands_of_a_group() -> None:
     assert (ended.returncode, ended.stdout.split(), ended.stderr) == (0, ["submit", "status", "similar"], "")
 
 
+@pytest.mark.long
 def test_run_takes_an_image_as_its_floor_and_modules_beside(tmp_path: Path) -> None:
     Image.new("RGB", (2362, 1143), (90, 200, 30)).save(tmp_path / "own.png")
     (tmp_path / "helper.py").write_text("def red(sensor):\n    return sensor.reflected_light_intensity\n")
@@ -215,6 +217,7 @@ def test_run_says_how_long_a_responder_may_compute(tmp_path: Path) -> None:
     assert "it computed for more than 0.5 seconds of CPU time" in ended.stderr
 
 
+@pytest.mark.long
 def test_one_program_is_run_over_another_and_filmed(tmp_path: Path) -> None:
     one, other = tmp_path / "robot.py", tmp_path / "other.py"
     drives = "tank_drive.on_for_seconds(SpeedPercent(30), SpeedPercent({}), 1)\n"

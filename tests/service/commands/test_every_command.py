@@ -220,6 +220,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]
     return folder, {"BATCH": batch.id, "GRADE": grades[0], "OVER": waiting, "HOOK": hook.id, "KEY": key.key.id}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("line", "keys"), _CASES)
 def test_a_command_tells_the_same_in_words_and_as_a_document(
     line: str, keys: str, home: tuple[Path, dict[str, str]], tmp_path: Path

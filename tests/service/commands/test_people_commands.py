@@ -124,6 +124,7 @@ def test_several_are_one_document_that_names_student_and_file(tmp_path: Path) ->
     assert [row.get("score") for row in for_gradescope] == [10, 6, None]
 
 
+@pytest.mark.long
 def test_the_autograder_writes_what_gradescope_reads(tmp_path: Path) -> None:
     """The folders are those of Gradescope's harness: source, submission and results below a folder with the script."""
     home, root = tmp_path / "home", tmp_path / "autograder"

@@ -220,6 +220,7 @@ def test_harmless_modules_are_no_doubt(text: str, runner: TrialRunner) -> None:
     assert judged(text, runner, avoids=["on_for_*()"]).for_staff == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("helper", "words"),
     [
@@ -295,6 +296,7 @@ def driven_by(text: str, runner: TrialRunner, *, visibility: str = "visible", **
     return grade(Submission("ada", program=program, files=files), drives, runner=runner).criteria[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "rules", "holds"),
     [

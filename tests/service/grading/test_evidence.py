@@ -103,6 +103,7 @@ _SUBMISSIONS: Sequence[tuple[str, str, str, str, str]] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "robot", "responder", "most", "before"), _SUBMISSIONS, ids=lambda value: value if "-" in value else ""
 )
@@ -170,6 +171,7 @@ _DRIVEN = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("folder", "answers", "name", "marked", "now", "before"), _DRIVEN)
 def test_what_was_seen_from_many_sides_is_one_thing(
     folder: str,

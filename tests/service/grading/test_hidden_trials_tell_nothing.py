@@ -184,6 +184,7 @@ def channels(known: Mapping[str, str]) -> list[Any]:
     return [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in known]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("channel", channels(PROGRAMS))
 def test_what_a_program_does_in_hidden_trials_is_not_told(
     runner: TrialRunner, hidden_assignment: Assignment, channel: str
@@ -255,6 +256,7 @@ def training() -> Assignment:
     return replace(assignment, scenarios=scenarios, criteria=(*criteria, pooled), limits=limits)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "channel", [pytest.param(name, marks=[pytest.mark.long] * (number > 0)) for number, name in enumerate(MODELS)]
 )

@@ -91,6 +91,7 @@ def graded_case(case: Mapping[str, Any], folder: Path, runner: TrialRunner) -> G
     return grade(read_submission(written(case, folder), required_parts=assignment.parts), assignment, runner=runner)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", NEAR_MISSES, ids=lambda case: case["name"])
 def test_a_near_miss_is_named_first(case: Mapping[str, Any], runner: TrialRunner, tmp_path: Path) -> None:
     graded = graded_case(case, tmp_path, runner)
@@ -219,6 +220,7 @@ def bound_by(text: str) -> Iterator[str]:
             yield from (target.id for target in node.targets if isinstance(target, ast.Name))
 
 
+@pytest.mark.long
 def test_searching_for_hints_takes_time_that_grows_with_the_length(tmp_path: Path) -> None:
     def cost(lines: int) -> float:
         text = "".join(f"print('P Y : :{number}' * 2)  # {'x(' * 40}\n" for number in range(lines))

@@ -229,6 +229,7 @@ _PATTERNS = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pattern", _PATTERNS)
 @given(st.text(st.sampled_from("aAbBxéÉ١1.-_]\\ \n\t\u2003\x85e0²"), max_size=6), st.booleans())
 def test_patterns_mean_what_they_mean_in_python(pattern: str, text: str, ignore_case: bool) -> None:
@@ -342,6 +343,7 @@ def _children() -> set[str]:
     return set(Path(f"/proc/self/task/{os.getpid()}/children").read_text().split())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("misbehave", "cause", "run"),
     [

@@ -129,6 +129,7 @@ def test_the_share_is_notable_from_two_fifths_on() -> None:
     assert not NoEffortResult("empty", None, Decimal(10), "robot.py is missing").is_notable
 
 
+@pytest.mark.long
 def test_the_check_shows_and_exports_what_no_effort_earns(tmp_path: Path) -> None:
     folder = _write_assignment(tmp_path / "generous", _GENEROUS)
     shown = robomark("assignments", "check", folder)

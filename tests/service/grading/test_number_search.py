@@ -110,6 +110,7 @@ def test_the_direction_of_a_change_is_named() -> None:
     assert load_language("de").translate_sentence(sentence) == "Die Drehung in line 8 ist zu kurz."
 
 
+@pytest.mark.long
 def test_the_command_shows_staff_the_number(tmp_path: Path) -> None:
     reference = locate_examples("trace-a-square") / "reference" / "robot.py"
     program = tmp_path / "robot.py"

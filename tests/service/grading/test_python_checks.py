@@ -141,6 +141,7 @@ def trusting(tmp_path_factory: pytest.TempPathFactory) -> Assignment:
     return read_assignment(folder)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", MISLEADING, ids=lambda text: text[:12])
 def test_no_text_of_a_students_ends_the_job_by_way_of_a_check(
     text: str, trusting: Assignment, runner: TrialRunner

@@ -73,6 +73,7 @@ def spared(graded: Grade, role: str) -> list[int]:
     return [number for number, each in enumerate(graded.trials) if REPLAY_NOTES[role] in each.recording.notes]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("files", "role", "count"),
     [

@@ -62,6 +62,7 @@ def _most(rows: list[list[Any]]) -> int:
     return max(len(rows) // 2, *(rows.count(row) for row in rows))
 
 
+@pytest.mark.long
 @given(_ROWS | _SHARED_ROWS, st.data())
 def test_no_constant_text_passes_at_more_than_half_of_the_poses(rows: list[list[Any]], data: st.DataObject) -> None:
     entries = [entry for row in rows for entry in row]
@@ -70,6 +71,7 @@ def test_no_constant_text_passes_at_more_than_half_of_the_poses(rows: list[list[
     assert _passes(rows, " ".join(map(str, constant_parts))) <= _most(rows)
 
 
+@pytest.mark.long
 @given(_ROWS | _SHARED_ROWS, st.sampled_from(["mean", "median", "worst"]), st.data())
 def test_no_constant_text_earns_anything_at_more_than_half_of_the_poses(
     rows: list[list[Any]], over: str, data: st.DataObject
@@ -149,6 +151,7 @@ _KEYS_OF_LABELS = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.long
 @given(st.sampled_from(["Simple_Shapes", "MNIST_Digits"]), _KEYS_OF_LABELS, st.data())
 def test_a_list_of_labels_passes_at_one_of_them_at_most(
     background: str, keys: dict[str, Any], data: st.DataObject
@@ -189,6 +192,7 @@ def test_a_label_that_fits_most_poses_is_warned_of(world: WorldSpec, poses: list
     assert [warned in warning for warning in warnings] == [True] * bool(warned)
 
 
+@pytest.mark.long
 @given(_ROWS | _SHARED_ROWS, st.sampled_from([" ", " or ", ", ", " | columns "]))
 def test_neither_does_one_that_has_everything(rows: list[list[Any]], between: str) -> None:
     everything = between.join(str(entry) for row in rows for entry in row)

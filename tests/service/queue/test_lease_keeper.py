@@ -56,6 +56,7 @@ def test_a_lease_is_renewed_while_nothing_is_said(store: Store) -> None:
     assert leased_until() == last
 
 
+@pytest.mark.long
 def test_a_job_that_is_silent_for_longer_than_its_lease_is_graded_at_its_first_attempt(
     store: Store, service_settings: Settings
 ) -> None:

@@ -60,6 +60,7 @@ def set_marks(store: Store, job_id: str, marks: str) -> None:
         session.execute(update(Job).where(Job.id == job_id).values(marks=Decimal(marks)))
 
 
+@pytest.mark.long
 def test_a_provisional_grade_is_completed_and_replaced(
     store: Store, service_settings: Settings, runner: TrialRunner, assignment: Assignment
 ) -> None:
@@ -114,6 +115,7 @@ def test_only_exact_grades_are_published_unless_asked(
     assert standing(store, accepted.submission_id).published_at is not None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("rule", "published_marks", "is_replaced"),
     [
@@ -212,6 +214,7 @@ def test_a_student_learns_no_exact_processor_time_of_hidden_trials(
     assert estimates == {60}
 
 
+@pytest.mark.long
 def test_a_copy_of_a_provisional_grade_is_completed_too(
     store: Store, service_settings: Settings, runner: TrialRunner, assignment: Assignment
 ) -> None:
@@ -227,6 +230,7 @@ def test_a_copy_of_a_provisional_grade_is_completed_too(
     assert (exact.provisional, exact.standing, exact.copied_from is not None) == (False, Standing.STANDS, True)
 
 
+@pytest.mark.long
 def test_white_space_gains_nothing(
     store: Store, service_settings: Settings, runner: TrialRunner, assignment: Assignment
 ) -> None:

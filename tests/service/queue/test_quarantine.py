@@ -152,6 +152,7 @@ def test_what_begins_for_the_question_is_what_answers_it(runner: TrialRunner, mo
 _LOADED = "import importlib, json, sys; importlib.import_module(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("module", "heavy"),
     [

@@ -129,6 +129,7 @@ def test_examples_are_graded_once_each_and_as_without_a_queue(service: Service, 
             assert all(plot.data.startswith(b"\x89PNG") for plot in plots.values())
 
 
+@pytest.mark.long
 def test_a_job_that_no_attempt_could_grade_is_dead_at_once_and_says_why(service: Service) -> None:
     lacking = grading_request("lacking")
     broken = GradingRequest(replace(lacking.submission, program=None, responder=None), lacking.assignment, "lacking")
@@ -145,6 +146,7 @@ def _lines(service: Service, batch: str) -> list[job_lines.JobLine]:
         return job_lines.load_job_lines(session, batch)
 
 
+@pytest.mark.long
 def test_a_killed_worker_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(2))
     running = service.until_running(batch)
@@ -169,6 +171,7 @@ def test_a_killed_pool_child_loses_nothing(service: Service) -> None:
     assert [job.attempt for job in graded] == [2]
 
 
+@pytest.mark.long
 def test_a_killed_broker_loses_nothing(service: Service) -> None:
     batch = service.submit(_spinning(1) + [grading_request(f"quick-{number}") for number in range(4)])
     service.until_running(batch)
@@ -221,6 +224,7 @@ def _has_student(pool_child: int) -> bool:
     return any(find_children(zygote) for doorkeeper in doorkeepers for zygote in find_children(doorkeeper))
 
 
+@pytest.mark.long
 def test_a_cancelled_job_stops(service: Service) -> None:
     batch = service.submit(_spinning(1))
     job = service.until_running(batch)
@@ -272,6 +276,7 @@ def test_a_broker_holds_the_lock_of_its_home_as_long_as_it_lives(tmp_path: Path)
         assert until(again)
 
 
+@pytest.mark.long
 def test_a_broker_that_was_found_running_is_left_running(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     with EmbeddedBroker(settings):

@@ -181,6 +181,7 @@ def test_what_ends_is_started_again_and_a_kill_leaves_nothing(tmp_path: Path) ->
             assert [job.attempt for job in session.scalars(select(Job))] == [1]
 
 
+@pytest.mark.long
 def test_serve_says_what_is_not_well(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     with robomark("serve", "--port", "0", **_environment(settings)) as server:

@@ -64,6 +64,7 @@ def test_a_trial_without_ticks_has_a_film(count: int) -> None:
     assert len(frames_of(render_film(trial_of(build.line_follower_recording(count)), {}))) >= 1
 
 
+@pytest.mark.long
 def test_two_robots_hostile_texts_and_far_ways_break_nothing() -> None:
     hostile = build.hostile_grade().trials[0].recording
     recording = build.line_follower_recording(45)

@@ -219,6 +219,7 @@ HOSTILE = (
 _LARGEST = f"a -> b [label = '{'very ' * 20}\\n{'long ' * 20}'];" * MAX_STEPS
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["blockdiag", "seqdiag"])
 @pytest.mark.parametrize(
     "text",

@@ -76,6 +76,7 @@ def _compared(programs: Mapping[str, str], runner: TrialRunner, trials: int) -> 
     return compare_submissions(ASSIGNMENT.id, sources, collect_given_code(ASSIGNMENT), behaviours)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trials", [1, 2])
 def test_a_copy_that_was_rewritten_is_found_by_its_path_and_its_recordings(runner: TrialRunner, trials: int) -> None:
     original = EDGE_FOLLOWER.format(speed=17, gain=0.37, edge=46)

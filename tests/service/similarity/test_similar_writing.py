@@ -122,6 +122,7 @@ def test_names_numbers_texts_and_layout_do_not_count() -> None:
     assert tokenise_source(one).numbers.tolist() != tokenise_source(one.replace("read", "write")).numbers.tolist()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "text",
     [

@@ -104,6 +104,7 @@ def test_a_purge_keeps_submissions_that_are_regraded_meanwhile(store: Store) -> 
     assert removed.submission_id != kept.submission_id
 
 
+@pytest.mark.long
 def test_staff_workers_and_the_lease_reaper_at_once(store: Store) -> None:
     batch = accept_batch(store, "class", [grading_request(name) for name in STUDENTS], [], max_attempts=1000)
     for _ in STUDENTS:
@@ -426,6 +427,7 @@ def _calls(name: str) -> Iterator[tuple[str, ast.Call]]:
                 yield f"{file.relative_to(ROOT)}:{node.lineno}", node
 
 
+@pytest.mark.long
 def test_no_lock_keeps_foreign_keys_from_being_checked() -> None:
     """``FOR UPDATE`` blocks the ``KEY SHARE`` lock of a foreign key check; ``key_share=True`` does not."""
     lock_calls = dict(_calls("with_for_update"))

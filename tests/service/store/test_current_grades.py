@@ -100,6 +100,7 @@ def _readers(store: Store, batch_id: str | None) -> dict[str, str | None]:
     return current_jobs
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["dead", "waiting", "running"])
 def test_a_newer_attempt_without_a_grade_leaves_the_marks_of_the_earlier_one(store: Store, how: str) -> None:
     batch = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
@@ -153,6 +154,7 @@ def _change_some_marks(store: Store, chance: random.Random) -> None:
                     overrides.excuse_criterion(session, job_id, each.id, "the task was wrong", "grace")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rule", CountedAttempt)
 @pytest.mark.parametrize("seed", quick_first(range(3)))
 def test_all_readers_name_the_same_attempt_after_any_history(store: Store, seed: int, rule: CountedAttempt) -> None:
@@ -244,6 +246,7 @@ def test_an_earlier_attempt_is_not_passed_back_where_all_of_the_newest_is_excuse
     assert sent == []
 
 
+@pytest.mark.long
 def test_the_best_attempt_counts_and_the_latest_of_several(store: Store) -> None:
     first_criterion = GRADE.criteria[0].id
     batch = accept_batch(store, "class", [grading_request("ada")], [], max_attempts=1)
@@ -288,6 +291,7 @@ def test_each_attempt_is_graded_and_counted_where_the_best_counts(store: Store) 
             assert made == attempts + (rule is CountedAttempt.BEST)  # the last of the first two is queued, too
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("visibility", ["hidden", "after_published", "after_due_date"])
 def test_students_cannot_compare_hidden_marks_by_the_attempt_that_counts(store: Store, visibility: str) -> None:
     _set_rule(store, CountedAttempt.BEST)

@@ -66,6 +66,7 @@ def test_an_open_home_is_repaired_and_said_so_once(tmp_path: Path) -> None:
     assert _open(home) == []
 
 
+@pytest.mark.long
 def test_the_home_is_private_whatever_the_umask_and_reports_go_by_it(tmp_path: Path) -> None:
     home, report, marks = tmp_path / "home", tmp_path / "reports", tmp_path / "marks.csv"
     (tmp_path / "class").mkdir()
@@ -84,6 +85,7 @@ def test_the_home_is_private_whatever_the_umask_and_reports_go_by_it(tmp_path: P
     assert _mode(tmp_path / "copy.db") == 0o600
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("umask", [0o022, 0o077])
 def test_what_a_user_asked_for_elsewhere_goes_by_the_users_umask(tmp_path: Path, umask: int) -> None:
     (tmp_path / "robot.py").write_text("print('hello')\n")
@@ -255,6 +257,7 @@ def test_what_a_service_starts_makes_files_for_us_alone(tmp_path: Path) -> None:
     assert _mode(tmp_path / "made") == 0o600
 
 
+@pytest.mark.long
 def test_a_worker_by_itself_takes_the_umask_of_the_home(tmp_path: Path) -> None:
     """A unit file starts it in this way, without the command line."""
     process = subprocess.Popen(

@@ -172,6 +172,7 @@ def _seeds(home: Path, **environment: Any) -> list[int]:
     return [trial["seed"] for trial in json.loads(ended.stdout)["trials"]]
 
 
+@pytest.mark.long
 def test_every_home_has_its_own_worlds(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     assert _seeds(one) == _seeds(one) != _seeds(other)

@@ -237,6 +237,7 @@ def test_a_write_of_a_state_would_be_found(written: str) -> None:
 _WRITERS, _TEST_RUNS = ("store/queue/jobs.py", "store/queue/job_transitions.py"), "store/queue/test_runs.py"
 
 
+@pytest.mark.long
 def test_nothing_else_writes_the_state_of_a_job() -> None:
     folder = Path(service.__file__ or "").parent
     assert "Job" not in _imported((folder / _TEST_RUNS).read_text(encoding="utf-8"))

@@ -122,6 +122,7 @@ def _csv(table: object, rows: object) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(_written(table, rows))))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "marks", "most", "of_all"),
     [

@@ -239,6 +239,7 @@ def _regrade(
         return tuple(regrade_changes.load_changes(session, regrade.batch_id, NO_HIDDEN_NAMES))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("plant", _list_cases(SINGLE))
 def test_a_planted_change_is_named(
     sqlite_store: Store, settings: Settings, runner: TrialRunner, tmp_path: Path, monkeypatch: Patch, plant: Plant

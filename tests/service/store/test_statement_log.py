@@ -269,6 +269,7 @@ TAMPERINGS: dict[str, tuple[Callable[[Session, str], None], str]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", TAMPERINGS)
 def test_tampering_is_named_against_filed_hashes(store: Store, published: Published, kind: str) -> None:
     head = _write_head(store)

@@ -235,6 +235,7 @@ def test_what_the_first_tables_called_superseded_is_cancelled(service_settings: 
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sentence", "exceeded", "now"),
     [

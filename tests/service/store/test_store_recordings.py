@@ -150,6 +150,7 @@ def test_a_cut_recording_is_refused() -> None:
         from_bytes(data[: len(data) // 2])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cap", [40_000, 5_000, 1_500])
 def test_what_is_too_large_is_cut_and_says_so(cap: int) -> None:
     recording = report_builders.line_follower_recording(300)
@@ -165,6 +166,7 @@ def test_what_is_too_large_is_cut_and_says_so(cap: int) -> None:
         assert getattr(cut, name) == getattr(flood, name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", list_catalogue_ids())
 def test_an_assignment_comes_back_as_it_was(name: str) -> None:
     assignment = find_assignment(name)

@@ -75,6 +75,7 @@ def test_they_are_run_in_turn_and_each_student_sees_their_own(store: Store) -> N
         assert test_runs.find_newest_run(session, ada, echo().id) == first
 
 
+@pytest.mark.long
 def test_a_student_has_one_at_a_time_and_so_many_an_hour(store: Store) -> None:
     ada = _enrolled(store)
     _ask(store, ada)

@@ -159,6 +159,7 @@ def _check_readers(signed: tuple[Web, Signed], route: str, readers: Set[str]) ->
             assert answer.headers["location"].startswith("/sign-in")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("route", sorted(route for route in ROUTES if API in route and " " in ROUTES[route]))
 def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: str) -> None:
     web, signed_requests = signed
@@ -172,6 +173,7 @@ def test_a_token_without_the_scope_may_not(signed: tuple[Web, Signed], route: st
     assert scope in answer.json()["detail"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("route", sorted(_CHANGING))
 def test_what_changes_something_asks_for_the_forms_word(signed: tuple[Web, Signed], route: str) -> None:
     """Only readers who may use the route: the others are refused with the word, too."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from httpx2 import Response
 from sqlalchemy import select
 from starlette.testclient import TestClient
@@ -128,6 +129,7 @@ def test_what_students_have_been_shown_is_replaced_by_an_upload_where_that_is_sa
     assert "Another" in grace.get(path).text
 
 
+@pytest.mark.long
 def test_the_catalogue_is_looked_through_by_words_and_topic(web: Web, grace: TestClient) -> None:
     path = f"{HOME}/catalogue"
 

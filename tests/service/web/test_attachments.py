@@ -67,6 +67,7 @@ def signed_web(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, 
         yield web, grace, web.browser(grace)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ['x"; filename="evil.html', "../../x", "\u2603", "a\r\nset-cookie: b", ".hidden", ""])
 def test_an_export_has_the_name_of_its_batch_and_no_more(signed_web: tuple[Web, Member, TestClient], name: str) -> None:
     web, grace, browser = signed_web

@@ -213,6 +213,7 @@ def test_the_assignment_is_the_courses_own_where_it_has_one_and_never_a_folder(w
     assert answer.status_code == 422
 
 
+@pytest.mark.long
 def test_the_table_is_sorted_filtered_searched_and_cut(web: Web, grace: TestClient) -> None:
     refusals = (RejectedSubmission("late.zip", "is empty, expected files.", Student("late")),)
     requests = [grading_request(f"s{number:03}") for number in range(120)]
@@ -464,6 +465,7 @@ def test_hidden_names_are_nowhere_on_the_pages_of_who_marks(web: Web, grace: Tes
     assert "ada-lovelace" in grace.get(path).text
 
 
+@pytest.mark.long
 def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
     made = a_batch(web, "=cmd()", "bob")
     path = f"{HOME}/batches/{made.id}"

@@ -75,6 +75,7 @@ def test_the_best_attempt_counts_if_the_course_says_so(web: Web, course: TestCli
     assert _rows(course.get(PATH).text)[0] == "ada Áda Lovelace 6 / 6"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("query", "students"),
     [

@@ -72,6 +72,7 @@ _FEW = _assignment(1, first=False, seconds=90)
 _MANY = _assignment(3, first=True, seconds=60)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("example", _EXAMPLES)
 def test_answers_do_not_depend_on_what_is_hidden(
     tmp_path: Path, runner: TrialRunner, monkeypatch: pytest.MonkeyPatch, example: str

@@ -183,6 +183,7 @@ def test_a_launch_counts_once_and_in_the_browser_that_began_it(launched: tuple[W
     assert _end(browser, begun["state"], token).status_code == 422
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("target", "path"),
     [

@@ -194,6 +194,7 @@ def test_a_check_needs_an_open_assignment_and_a_notebook(notebook: Notebook) -> 
     assert (closed.status_code, "is closed" in closed.json()["detail"]) == (422, True)
 
 
+@pytest.mark.long
 def test_a_students_token_that_may_submit_can_do_nothing_else(tmp_path: Path) -> None:
     with web_in(tmp_path) as web:
         world = make_world(web)

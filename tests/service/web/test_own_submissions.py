@@ -146,6 +146,7 @@ def test_a_limit_and_an_extension_are_told_as_they_count(web: Web, ada: Member) 
             policies.set_policy(session, 1, "open", PolicyLimits())
 
 
+@pytest.mark.long
 def test_files_go_where_they_are_waited_for_and_come_back_as_they_were(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
     files = [("files", ("robot.py", PROGRAM.encode())), ("files", ("responder.py", RESPONDER.encode()))]
@@ -180,6 +181,7 @@ def test_a_refusal_keeps_what_was_typed_as_it_was(web: Web, ada: Member, path: s
     assert "No files were submitted; select a file, or paste a program." in empty.text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("files", "texts", "german"),
     [
@@ -220,6 +222,7 @@ def test_a_part_that_is_missing_is_asked_for_once(web: Web, ada: Member) -> None
     assert again.status_code == 303
 
 
+@pytest.mark.long
 def test_too_many_are_told_when_to_come_again(web: Web, ada: Member) -> None:
     browser = web.browser(ada)
     answers = [submit(browser, f"{MINE}/open") for _ in range(11)]

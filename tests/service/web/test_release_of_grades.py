@@ -112,6 +112,7 @@ _CASES: list[tuple[ReleaseRule | None, timedelta | None, bool, bool]] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", quick_first(_CASES, quick=4))
 def test_a_grade_is_seen_when_the_policy_releases_it(
     web: Web, ada: Member, case: tuple[ReleaseRule | None, timedelta | None, bool, bool]
@@ -139,6 +140,7 @@ def test_publication_releases_the_grades_of_the_batch(web: Web, ada: Member) -> 
     assert {"appeal", "export"} < set(_read_secrets(web, ada))
 
 
+@pytest.mark.long
 def test_the_policy_of_the_assignment_replaces_the_default_completely(web: Web, ada: Member) -> None:
     _set(web, PolicyLimits(release=ReleaseRule.AT_ONCE, released_at=datetime.now(UTC) + _PAST), assignment="")
     _upload_for_her(web)
@@ -147,6 +149,7 @@ def test_the_policy_of_the_assignment_replaces_the_default_completely(web: Web, 
     assert _read_secrets(web, ada) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", [ReleaseRule.AT_ONCE, ReleaseRule.PUBLISHED])
 def test_each_course_has_its_own_policy(store: Store, first: ReleaseRule) -> None:
     second = ReleaseRule.PUBLISHED if first is ReleaseRule.AT_ONCE else ReleaseRule.AT_ONCE
@@ -167,6 +170,7 @@ def test_each_course_has_its_own_policy(store: Store, first: ReleaseRule) -> Non
     assert seen == shown == [rule is ReleaseRule.AT_ONCE for rule in (first, second, first)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("unseen_marks", [0, 4])
 def test_whether_an_unseen_attempt_is_the_best_is_not_told(web: Web, ada: Member, unseen_marks: int) -> None:
     with web.store.transaction() as session:
@@ -191,6 +195,7 @@ def test_the_form_and_the_api_set_the_release(web: Web) -> None:
     assert datetime.fromisoformat(listed[0]["released_at"]) == datetime(2026, 12, 14, 9).astimezone()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [("assignment_version_id", "The assignment was corrected."), ("grader_sha256", "A newer release of the grader")],

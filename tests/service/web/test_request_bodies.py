@@ -111,6 +111,7 @@ def _sign_in(web: Web, member: Member, is_program: bool) -> dict[str, str]:
     return {"cookie": f"robomark={browser.cookies['robomark']}"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("route", _UNSAFE)
 def test_nothing_is_read_of_somebody_unknown(
     route: str, world: tuple[Web, dict[str, str], dict[str, Member]], monkeypatch: pytest.MonkeyPatch
@@ -128,6 +129,7 @@ def test_nothing_is_read_of_somebody_unknown(
 _JSON, _FORM = "application/json", "application/x-www-form-urlencoded"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("route", "kind"),
     [
@@ -211,6 +213,7 @@ def test_json_is_parsed_in_another_thread_and_within_bounds(
     assert not any("MainThread" in name or "asyncio" in name for name in threads)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("route", _UNSAFE)
 def test_forms_in_another_charset_are_not_read(
     route: str, world: tuple[Web, dict[str, str], dict[str, Member]]

@@ -181,6 +181,7 @@ def test_a_student_does_not_become_an_instructor_under_their_own_sessions(web: W
         web.instructor("ada")
 
 
+@pytest.mark.long
 def test_the_commands_make_people_links_and_tokens(tmp_path: Path) -> None:
     added = robomark("user", "add", "grace", "--name", "Grace", "--operator", ROBOMARK_HOME=str(tmp_path))
     assert added.stdout.startswith("/sign-in/rml_")

@@ -71,6 +71,7 @@ _ENDINGS: dict[str, Callable[[Web, Claim], None]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ending", quick_first(_ENDINGS, quick=2))
 def test_students_read_no_fault_of_ours(web: Web, ending: str) -> None:
     ada, batch_id = _submit(web)

@@ -254,6 +254,7 @@ def test_over_a_limit_the_newest_is_kept_and_graded_when_staff_ask(once: Web) ->
     )
 
 
+@pytest.mark.long
 def test_a_submission_over_a_limit_that_has_a_comment_is_kept(once: Web) -> None:
     ada = once.student()
     _send(once, ada, 0)

@@ -61,6 +61,7 @@ def rows(page: str) -> list[str]:
     return re.findall(r'<th scope="row"><a [^>]*>([^<]*)', page[page.find("<tbody") :])
 
 
+@pytest.mark.long
 def test_each_student_is_in_the_table_once_with_the_attempt_that_counts(web: Web, grace: TestClient) -> None:
     ada, bob = web.student("ada"), web.student("bob")
     web.student("cyd")

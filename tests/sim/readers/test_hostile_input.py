@@ -111,6 +111,7 @@ _REFUSED: dict[str, tuple[Callable[[], object], str]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", _REFUSED)
 def test_it_is_refused_before_it_is_parsed(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     read, parser = _REFUSED[case]
@@ -173,6 +174,7 @@ def test_what_is_allowed_is_read_in_little_memory() -> None:
 _QUOTES = ('\\"', '"\\\\"', "'", '"""', "'''", '"x', '"\n', "'\n", '["', '{"a', "#'")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("quotes", _QUOTES)
 @pytest.mark.parametrize("before", ["", "[[" * 60, 'a = """'])
 @pytest.mark.parametrize("read", [read_json, read_toml, parse_module, read_rows, lambda text: read_yaml(text.encode())])

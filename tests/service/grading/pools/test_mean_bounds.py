@@ -39,6 +39,7 @@ def share_of_wrong_bounds(make_pool: Callable[[np.random.Generator], Scores], gr
     return wrong / gradings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", POOLS)
 @pytest.mark.parametrize("gradings", [40, pytest.param(1000, marks=pytest.mark.long)])
 def test_bounds_are_wrong_less_often_than_declared(name: str, gradings: int) -> None:

@@ -40,6 +40,7 @@ def list_variants(program: str) -> list[str]:
     return variants
 
 
+@pytest.mark.long
 def test_best_of_twenty_variants_in_white_space_is_as_good_as_one(assignment: Assignment, runner: TrialRunner) -> None:
     variants = list_variants(LUCKY)
     submissions = {pool_request(assignment, program=each).submission.sha256 for each in variants}

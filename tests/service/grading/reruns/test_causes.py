@@ -99,6 +99,7 @@ def test_lost_messages_are_the_cause_for_a_program_that_sends_once(runner: Trial
     assert causes["resends"].next_step == "Fix your program, then submit again."
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("replacements", "criterion", "text"),
     [
@@ -142,6 +143,7 @@ def test_halves_that_do_not_fit_together(runner: TrialRunner) -> None:
     assert causes["says"].endswith("Your program and your responder do not fit together.")
 
 
+@pytest.mark.long
 def test_visible_trials_prove_nothing_for_marks_that_another_criterion_withholds(runner: TrialRunner) -> None:
     # The responder loses the marks of a criterion with hidden trials, which the criterion "finishes" needs.
     causes = explained(runner, "image-parser", responder=('{"typ": kind', '{"typ": kind.lower()'))

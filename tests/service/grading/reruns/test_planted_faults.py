@@ -84,6 +84,7 @@ def _build_case(number: int, fault: dict[str, Any]) -> Any:
     return pytest.param(fault, id=name, marks=() if is_quick else pytest.mark.long)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", [_build_case(number, each) for number, each in enumerate(_FAULTS, 1)])
 def test_the_fault_is_named(fault: dict[str, Any], runner: TrialRunner) -> None:
     sentences, named, places = _explain(fault, runner)
