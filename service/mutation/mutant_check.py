@@ -1,14 +1,15 @@
 """Grading of mutants of an assignment's reference: which faults the assignment finds, and which keep full marks.
 
 A mutant whose recordings equal those of the reference behaves in the same way: it is equivalent, and not a fault. A
-mutant that behaves differently is killed if it loses marks, and survives otherwise. The module prints nothing.
+mutant that behaves differently is killed if it loses marks, and survives otherwise. The assignment's author can give
+reasons why survivors are solutions too. The module prints nothing.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Literal
@@ -19,6 +20,7 @@ from service.grading.pools.drawing import PoolExtent
 from service.grading.trial_runner import TrialRunner
 from service.grading.trial_selection import needs_every_trial, select_trials
 from service.mutation.mutants import Mutant, choose_mutants, iterate_mutants
+from service.mutation.survivor_reasons import SurvivorReason, read_survivor_reasons
 from sim.errors import UsageError
 from submissions.assignment.definition import Assignment
 from submissions.assignment.examples import read_example
@@ -27,6 +29,8 @@ from submissions.assignment.reader import find_assignment
 from submissions.submission import SECOND_PROGRAM, Part, Submission
 
 Fate = Literal["killed", "equivalent", "survivor"]
+#: Largest share of unexplained survivors among the mutants that behave differently, without a warning.
+MAX_UNEXPLAINED_SHARE = 0.1
 #: CPU seconds for each mutant on average. The remaining mutants are not graded after that.
 _CPU_SECONDS_PER_MUTANT = 4.0
 #: Enough for a reference, and short for an endless loop.
@@ -35,40 +39,54 @@ _PROGRAM_CPU_SECONDS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class MutantResult:
-    """The result of one mutant. ``lost`` are the criteria that found the fault, as far as they were judged."""
+    """The result of one mutant. ``lost`` are the criteria that found the fault, as far as they were judged.
+
+    ``reason`` says why a survivor is a solution too; it is empty if the author gives none.
+    """
 
     mutant: Mutant
     fate: Fate
     lost: tuple[str, ...] = ()
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorCounts:
-    """The numbers of mutants of one operator."""
+    """The numbers of mutants of one operator. ``unexplained`` are the survivors without a reason."""
 
     operator: str
     mutants: int
     equivalent: int
     killed: int
     survivors: int
+    unexplained: int
 
 
 @dataclass(frozen=True)
 class MutantCheck:
     """The results of all graded mutants of a reference, in the order of its files and lines.
 
-    ``ungraded`` mutants were left out, because the others used all the CPU time. ``problem`` says why there are none.
+    ``ungraded`` mutants were left out, because the others used all the CPU time. ``stale_reasons`` cover no mutant that
+    can still survive. ``problem`` says why there are no results.
     """
 
     assignment: str
     results: tuple[MutantResult, ...] = ()
     ungraded: int = 0
+    stale_reasons: tuple[SurvivorReason, ...] = ()
     problem: str = ""
 
     @cached_property
     def survivors(self) -> tuple[MutantResult, ...]:
         """The mutants that behave differently and keep the marks of the reference."""
         return tuple(each for each in self.results if each.fate == "survivor")
+
+    @property
+    def unexplained_share(self) -> float:
+        """The share of unexplained survivors among the mutants that behave differently; 0 if there are none."""
+        total = self.total
+        different = total.mutants - total.equivalent
+        return total.unexplained / different if different else 0.0
 
     @property
     def counts(self) -> tuple[OperatorCounts, ...]:
@@ -83,7 +101,10 @@ class MutantCheck:
 
     def _count_fates(self, operator: str) -> OperatorCounts:
         fates = Counter(each.fate for each in self.results if operator in ("", each.mutant.operator))
-        return OperatorCounts(operator, fates.total(), fates["equivalent"], fates["killed"], fates["survivor"])
+        unexplained = sum(operator in ("", each.mutant.operator) and not each.reason for each in self.survivors)
+        return OperatorCounts(
+            operator, fates.total(), fates["equivalent"], fates["killed"], fates["survivor"], unexplained
+        )
 
 
 @dataclass(frozen=True)
@@ -101,13 +122,15 @@ def check_mutants(name_or_path: str, limit: int, *, runner: TrialRunner) -> Muta
     """Grade at most ``limit`` mutants of the reference of an assignment.
 
     Raises:
-        AssignmentError: The assignment is invalid.
+        AssignmentError: The assignment or its ``survivors.toml`` is invalid.
         HostError: The machine failed.
     """
     assignment = find_assignment(name_or_path)
+    reasons = read_survivor_reasons(name_or_path)
     try:
         reference = read_example(name_or_path, REFERENCE)
-        mutants = choose_mutants(list(_iterate_all_mutants(reference, assignment)), limit)
+        all_mutants = list(iterate_reference_mutants(reference, assignment))
+        mutants = choose_mutants(all_mutants, limit)
     except UsageError as error:
         return MutantCheck(assignment.id, problem=str(error))
     if not mutants:
@@ -120,11 +143,34 @@ def check_mutants(name_or_path: str, limit: int, *, runner: TrialRunner) -> Muta
     for mutant in mutants:
         if time.process_time() + runner.children_cpu_seconds > end:
             break
-        results.append(check.grade_mutant(mutant))
-    return MutantCheck(assignment.id, tuple(results), len(mutants) - len(results))
+        results.append(_explain(check.grade_mutant(mutant), reasons))
+    return MutantCheck(
+        assignment.id,
+        tuple(results),
+        len(mutants) - len(results),
+        tuple(_iterate_stale_reasons(reasons, all_mutants, results)),
+    )
 
 
-def _iterate_all_mutants(reference: Submission, assignment: Assignment) -> Iterator[Mutant]:
+def _explain(result: MutantResult, reasons: Sequence[SurvivorReason]) -> MutantResult:
+    """Return the result of a survivor with the first reason that covers it, and other results unchanged."""
+    if result.fate != "survivor":
+        return result
+    return replace(result, reason=next((each.reason for each in reasons if each.covers(result.mutant)), ""))
+
+
+def _iterate_stale_reasons(
+    reasons: Sequence[SurvivorReason], mutants: Sequence[Mutant], results: Sequence[MutantResult]
+) -> Iterator[SurvivorReason]:
+    """Yield the reasons that cover neither a survivor nor a mutant that was not graded."""
+    killed_or_equivalent = {each.mutant for each in results if each.fate != "survivor"}
+    candidates = [each for each in mutants if each not in killed_or_equivalent]
+    for reason in reasons:
+        if not any(reason.covers(mutant) for mutant in candidates):
+            yield reason
+
+
+def iterate_reference_mutants(reference: Submission, assignment: Assignment) -> Iterator[Mutant]:
     """Yield the mutants of all parts that students write."""
     parts = assignment.parts
     if reference.program is not None and parts.program == "student":

@@ -17,7 +17,10 @@ _MAX_CANDIDATES = 5000
 
 @dataclass(frozen=True, slots=True)
 class Mutant:
-    """A program with one fault. ``old`` became ``new`` in this line, from 1, of ``file``; ``source`` is the result."""
+    """A program with one fault. ``old`` became ``new`` in this line, from 1, of ``file``; ``source`` is the result.
+
+    ``line_text`` is the line before the change, with its indentation.
+    """
 
     operator: str
     part: Part
@@ -27,6 +30,7 @@ class Mutant:
     new: str
     source: str
     start: int = 0  # offset of ``old`` in the original text
+    line_text: str = ""
 
 
 def make_mutants(text: str, part: Part, limit: int, file: str = "") -> tuple[Mutant, ...]:
@@ -54,7 +58,17 @@ def iterate_mutants(text: str, part: Part, file: str = "") -> Iterator[Mutant]:
             known_sources.add(source)
             old = text[edit.start : edit.end]
             line = tree.find_line(edit.start)
-            yield Mutant(operator.name, part, file or PART_FILES[part], line, old, edit.new, source, edit.start)
+            yield Mutant(
+                operator.name,
+                part,
+                file or PART_FILES[part],
+                line,
+                old,
+                edit.new,
+                source,
+                edit.start,
+                tree.cut_line(line).rstrip(),
+            )
             if len(known_sources) > _MAX_CANDIDATES:
                 return
 

@@ -97,6 +97,11 @@ class SourceTree:
         """Return the offset at which a line, from 1, starts."""
         return self._line_starts[line - 1]
 
+    def cut_line(self, line: int) -> str:
+        """Return the text of a line, from 1."""
+        starts = [*self._line_starts, len(self.text)]
+        return self.text[starts[line - 1] : starts[line]]
+
     def replace(self, node: ast.expr | ast.stmt, new: str) -> Edit:
         """Return the edit that replaces a node."""
         return Edit(*self.locate(node), new)

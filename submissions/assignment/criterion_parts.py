@@ -67,7 +67,7 @@ def read_criteria(
 
 def check_given_files(document: Mapping[str, object], problems: Problems) -> None:
     """Report given files that contain answers: files of criteria, and the assignment's own description."""
-    answers = {"assignment.toml", "expected.toml"}
+    answers = {"assignment.toml", "expected.toml", "survivors.toml"}
     for raw in filter_tables(document.get("criterion")):
         schema = SCHEMAS.get(str(raw.get("check")))
         answers |= (

@@ -21,7 +21,7 @@ from submissions.assignment.problems import AssignmentProblems, Problems, find_l
 from submissions.suggestions import suggest_name
 
 #: Files in an assignment's folder that do not affect marks.
-NON_GRADING_FILES = ("starter", "examples", "expected.toml")
+NON_GRADING_FILES = ("starter", "examples", "expected.toml", "survivors.toml")
 _MAX_FOLDER_BYTES = 128 * 1024 * 1024
 _MAX_TOML_BYTES = 1024 * 1024
 _SYNTAX = re.compile(r"^(?P<what>.*?) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")

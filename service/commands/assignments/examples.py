@@ -28,7 +28,8 @@ from service.grading.example_check import CheckedAssignment, check_examples
 from service.grading.no_effort import grade_without_effort
 from service.grading.trial_runner import TrialRunner
 from service.home import user_permissions
-from service.mutation.mutant_check import MutantCheck, check_mutants
+from service.mutation.mutant_check import MAX_UNEXPLAINED_SHARE, MutantCheck, check_mutants
+from service.mutation.survivor_reasons import SURVIVORS
 from sim.errors import AssignmentError
 from submissions.assignment.examples import EXAMPLES, EXPECTED, add_expected
 from submissions.assignment.folder import FILE_NAME, REFERENCE, list_catalogue_ids
@@ -99,6 +100,13 @@ def _print_mutant_notes(check: MutantCheck) -> None:
         print_note(f"robomark: {check.assignment}: no mutants were graded: {check.problem}")
     if check.ungraded:
         print_note(f"robomark: {check.assignment}: {check.ungraded} mutants were not graded: no CPU time was left")
+    if check.unexplained_share > MAX_UNEXPLAINED_SHARE:
+        print_note(
+            f"robomark: {check.assignment}: {check.unexplained_share:.0%} of the mutants that behave differently keep "
+            f"full marks without a reason, expected at most {MAX_UNEXPLAINED_SHARE:.0%}"
+        )
+    for reason in check.stale_reasons:
+        print_note(f"robomark: {check.assignment}: {SURVIVORS} has a reason without a survivor: {reason.reason}")
 
 
 def _mutants_to_json(check: MutantCheck) -> dict[str, Any]:
@@ -108,9 +116,11 @@ def _mutants_to_json(check: MutantCheck) -> dict[str, Any]:
         "ungraded": check.ungraded,
         "survivors": [
             {"operator": each.mutant.operator, "file": each.mutant.file, "line": each.mutant.line,
-             "old": each.mutant.old, "new": each.mutant.new}
+             "old": each.mutant.old, "new": each.mutant.new, "reason": each.reason}
             for each in check.survivors
         ],
+        "unexplained_share": round(check.unexplained_share, 4),
+        "stale_reasons": [each.reason for each in check.stale_reasons],
         "problem": check.problem,
     }  # fmt: skip
 
