@@ -28,7 +28,7 @@ class Drawing(Criterion):
     - ``angle``, ``angle_within``: the angle between successive legs and its tolerance, degrees.
     - ``closes``: the figure ends at its start, within ``closes_within`` mm or a tenth of a leg, whichever is more.
     - ``sizes``: [least, most] of the mean leg, one for each figure.
-    - ``growing``: each figure is larger than the previous one.
+    - ``growing``: the legs of each figure are 1 mm longer than those of the previous one, or more.
     - ``at_least``: more figures than ``figures`` are allowed.
     - ``pen = false``: the whole path counts, with the pen up or down.
     """

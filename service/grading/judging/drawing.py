@@ -35,6 +35,8 @@ from submissions.criteria.drawing import Drawing
 _SAME_DIRECTION_DEGREES = 3.0
 #: Shorter straight parts belong to a corner, mm.
 _MIN_LEG_MM = 20.0
+#: A figure with legs that are longer by less than this, on average, is not larger than the one before, mm.
+_MIN_GROWTH_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +135,9 @@ def judge_drawing(criterion: Drawing, trial: TrialResult) -> Outcome:
         moment = find_place(recording, problem.row)
         return fail_with(problem.message, *moment, score=score, measures=measures, findings=problem.findings)
     means = [_compute_mean_length(figure) for figure in figures]
-    if criterion.growing and any(after <= before for before, after in itertools.pairwise(means)):
-        number = next(n for n, (before, after) in enumerate(itertools.pairwise(means)) if after <= before)
+    growths = [after - before for before, after in itertools.pairwise(means)]
+    if criterion.growing and min(growths, default=_MIN_GROWTH_MM) < _MIN_GROWTH_MM:
+        number = next(index for index, growth in enumerate(growths) if growth < _MIN_GROWTH_MM)
         return fail_with(
             Sentence(
                 "Expected each figure to be larger than the one before, but after legs of %(before).0f mm came legs "

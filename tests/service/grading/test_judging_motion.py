@@ -260,6 +260,7 @@ def square(side: float, angle: float = 90, legs: int = 4) -> list[Any]:
         (square(200) + square(300), {}, False),
         (square(200) + square(300), {"figures": 2, "growing": True}, True),
         (square(300) + square(200), {"figures": 2, "growing": True}, False),
+        (square(300) + square(300.5), {"figures": 2, "growing": True}, False),
         (square(200) + square(300), {"figures": 2, "sizes": [[150, 250], [150, 250]]}, False),
         (square(200) + square(300), {"figures": 1, "at_least": True}, True),
         ([straight(200), spin(90), straight(240), spin(90), straight(200), spin(90), straight(240)], {}, True),
