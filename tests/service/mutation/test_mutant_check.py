@@ -145,10 +145,11 @@ def test_reasons_change_no_version_and_are_not_exported_for_grading(
     assert not (tmp_path / "exported" / "survivors.toml").exists()
 
 
+@pytest.mark.long
 def test_the_command_reports_reasons_and_the_share_of_unexplained_survivors(explained_assignment: Path) -> None:
-    ended = robomark("assignments", "check", str(explained_assignment), "--mutants", "30", "--json")
+    ended = robomark("assignments", "check", str(explained_assignment), "--mutants", "10", "--json")
     mutants = json.loads(ended.stdout)["assignments"][0]["mutants"]
-    assert "The robot may drive farther." in {each["reason"] for each in mutants["survivors"]}
+    assert "The robot may drive at any speed." in {each["reason"] for each in mutants["survivors"]}
     assert mutants["stale_reasons"][0] == "The robot may drive less far."
     assert mutants["unexplained_share"] > 0.1
     assert "keep full marks without a reason, expected at most 10%" in " ".join(ended.stderr.split())
