@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -19,7 +19,10 @@ from sim.errors import UsageError
 #: Bytes of the key from which the salts of a statement's facts are computed.
 OPENING_KEY_BYTES = 32
 _SALT_DIGITS = 32
-_encode = json.JSONEncoder(ensure_ascii=True, separators=(",", ":"), sort_keys=True).encode
+#: Digits of a salt. Other characters would need escapes in the JSON of a commitment.
+_HEXADECIMAL = frozenset("0123456789abcdef")
+#: Return the JSON of a value as commitments contain it.
+encode_value = json.JSONEncoder(ensure_ascii=True, separators=(",", ":"), sort_keys=True).encode
 
 
 class FactKind(StrEnum):
@@ -54,8 +57,7 @@ class OpenFact:
     @property
     def commitment(self) -> str:
         """The commitment: the SHA-256 of the JSON array of salt, kind, number and value, without spaces."""
-        content = [self.salt, self.fact.kind.value, self.fact.number, self.fact.value]
-        return hashlib.sha256(_encode(content).encode("ascii")).hexdigest()
+        return _commit(self.salt, self.fact.kind.value, self.fact.number, encode_value(self.fact.value))
 
     def to_json(self) -> dict[str, Any]:
         """Return the fact as in the file of a statement."""
@@ -69,27 +71,47 @@ class OpenFact:
 
 def open_fact(fact: Fact, opening_key: bytes) -> OpenFact:
     """Return the fact with its salt, from which neither the key nor another salt can be computed."""
-    salt = hmac.digest(opening_key, f"{fact.kind.value} {fact.number}".encode("ascii"), "sha256")
-    return OpenFact(fact, salt.hex()[:_SALT_DIGITS])
+    return OpenFact(fact, _compute_salt(opening_key, fact.kind.value, fact.number))
 
 
 def commit_to_facts(facts: Sequence[OpenFact]) -> dict[str, Any]:
     """Return the commitments of a statement by kind: a list, or for kinds that only staff see one hash of it."""
-    commitments: dict[str, list[str]] = {kind.value: [] for kind in FactKind}
+    commitments: dict[FactKind, list[str]] = {kind: [] for kind in FactKind}
     for each in sorted(facts, key=lambda each: each.fact.number):
-        commitments[each.fact.kind.value].append(each.commitment)
-    return {
-        kind: hashlib.sha256(_encode(listed).encode("ascii")).hexdigest() if kind in SEALED_KINDS else listed
-        for kind, listed in commitments.items()
-    }
+        commitments[each.fact.kind].append(each.commitment)
+    return {kind.value: _seal(kind, listed) for kind, listed in commitments.items()}
+
+
+def commit_to_values(kind: FactKind, values: Iterable[str], opening_key: bytes) -> Any:
+    """Return the commitments to all values of a kind, as ``commit_to_facts`` does; ``values`` are their JSON."""
+    word = kind.value
+    listed = [
+        _commit(_compute_salt(opening_key, word, number), word, number, value) for number, value in enumerate(values, 1)
+    ]
+    return _seal(kind, listed)
 
 
 def parse_open_fact(value: Any) -> OpenFact:
     """Return the fact of a JSON value. Raises UsageError if it is none."""
     try:
         kind, number, salt = FactKind(value["kind"]), value["number"], value["salt"]
-        if type(number) is int and isinstance(salt, str) and isinstance(value["value"], dict):
+        if type(number) is int and _HEXADECIMAL.issuperset(salt) and isinstance(value["value"], dict):
             return OpenFact(Fact(kind, number, value["value"]), salt)
     except (KeyError, TypeError, ValueError):
         pass
     raise UsageError("the file has a fact without kind, number, value and salt")
+
+
+def _compute_salt(opening_key: bytes, kind: str, number: int) -> str:
+    return hmac.digest(opening_key, f"{kind} {number}".encode("ascii"), "sha256").hex()[:_SALT_DIGITS]
+
+
+def _commit(salt: str, kind: str, number: int, value: str) -> str:
+    return hashlib.sha256(f'["{salt}","{kind}",{number},{value}]'.encode("ascii")).hexdigest()
+
+
+def _seal(kind: FactKind, commitments: list[str]) -> Any:
+    """Return the commitments, or for kinds that only staff see the hash of their list."""
+    if kind not in SEALED_KINDS:
+        return commitments
+    return hashlib.sha256(encode_value(commitments).encode("ascii")).hexdigest()

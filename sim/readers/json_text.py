@@ -46,8 +46,10 @@ def read_json(
         except UnicodeDecodeError:
             raise UnreadableDataError("it is not UTF-8") from None
     _check_limits(text, max_values)
+    # With any option, json.loads builds a decoder, which takes as long as a short text.
+    options: dict[str, Any] = {} if strict else {"strict": False}
     try:
-        return json.loads(text, parse_constant=parse_constant, strict=strict)
+        return json.loads(text, parse_constant=parse_constant, **options)
     except JSONDecodeError:
         raise
     except RecursionError:

@@ -13,7 +13,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.statements.envelopes import Envelope
-from service.statements.facts import FactKind, OpenFact, commit_to_facts
+from service.statements.facts import FactKind, OpenFact
 from service.statements.keys import KeyLine
 from service.statements.log_head import FiledHead
 from service.statements.merkle_tree import compute_root
@@ -41,6 +41,22 @@ _SUBMISSION_PARTS = (
     "submission",
 )
 _MARKS_KINDS = (FactKind.TOTAL, FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
+_MARKS_WORDS = tuple(kind.value for kind in _MARKS_KINDS)
+_STATING_CHANGES = (None, Change.PUBLISHED.value, Change.CHANGED.value)
+
+#: The published grades. Outer joins, because tampering may have removed the row of a submission or a student.
+_SELECT_PUBLISHED = (
+    select(
+        Job.id, Job.submission_id, Job.published_at, (Job.enrolment_id == SubmissionRow.enrolment_id).label("is_own")
+    )
+    .add_columns(SubmissionRow.attempt, SubmissionRow.submitted_at, SubmissionRow.created_at, SubmissionRow.sha256)
+    .add_columns(Enrolment.student, AssignmentVersion.assignment, AssignmentVersion.version)
+    .outerjoin(SubmissionRow, Job.submission_id == SubmissionRow.id)
+    .outerjoin(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
+    .outerjoin(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
+    .where(Job.standing == Standing.STANDS, Job.published_at.is_not(None), Job.state == JobState.DONE)
+    .order_by(Job.id)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +152,7 @@ def _load_entries(session: Session, filed_leaves: Mapping[int, bytes], keys: Map
         key_id,
         signature,
         payload,
-    ) in session.execute(query, execution_options={"yield_per": _CHUNK_SIZE}):
+    ) in session.connection().execute(query, execution_options={"yield_per": _CHUNK_SIZE}):
         leaf = _read_hex(leaf_text)
         head = (number, leaf, format_moment(made_at), submission_id, job_id, _read_hex(opening_key))
         if payload is None:
@@ -171,7 +187,7 @@ def _summarise(statement: Statement) -> dict[str, Any]:
         "issued_at": predicate.get("issued_at"),
         "published_at": predicate.get("published_at"),
         "erased": tuple(each for each in erased if type(each) is int) if isinstance(erased, list) else (),
-        "commitments": {kind: listed.get(kind) for kind in _MARKS_KINDS},
+        "commitments": {kind: listed.get(kind) for kind in _MARKS_WORDS},
         "submission": (
             predicate.get("student"),
             assignment.get("id"),
@@ -265,16 +281,16 @@ def _check_grades(session: Session, entries: Sequence[_Entry], findings: _Findin
     Returns the number of published grades, and of those published before the first entry.
     """
     newest_entries = {entry.submission_id: entry for entry in entries if entry.submission_id is not None}
-    is_published = (Job.standing == Standing.STANDS, Job.published_at.is_not(None), Job.state == JobState.DONE)
-    query = select(Job.id, Job.submission_id, Job.published_at).where(*is_published).order_by(Job.id)
-    published_jobs = session.execute(query).all()
     # The first grades were published a moment before their entries.
     log_start = min(entries[0].made_at, str(entries[0].published_at or entries[0].made_at)) if entries else ""
-    older_grades, stated_jobs = 0, []
-    for job_id, submission_id, published_at in published_jobs:
-        entry = newest_entries.pop(submission_id, None)
-        if entry is not None and entry.job_id == job_id and entry.change in (None, Change.PUBLISHED, Change.CHANGED):
+    grades, older_grades, stated_jobs = 0, 0, []
+    for row in session.connection().execute(_SELECT_PUBLISHED):
+        grades += 1
+        job_id, published_at = row.id, row.published_at
+        entry = newest_entries.pop(row.submission_id, None)
+        if entry is not None and entry.job_id == job_id and entry.change in _STATING_CHANGES:
             stated_jobs.append((job_id, entry))
+            _compare_submission(row, entry, findings)
         elif entry is not None:
             findings.name_grade(entry.number, job_id, f"is published, but entry {entry.number} is on another grade")
         elif log_start and published_at is not None and format_moment(published_at) >= log_start:
@@ -286,41 +302,33 @@ def _check_grades(session: Session, entries: Sequence[_Entry], findings: _Findin
             sentence = f"of entry {entry.number} was removed, or is no longer published"
             findings.name_grade(entry.number, entry.job_id, sentence)
     for start in range(0, len(stated_jobs), _CHUNK_SIZE):
-        chunk = dict(stated_jobs[start : start + _CHUNK_SIZE])
-        _compare_submissions(session, chunk, findings)
-        _compare_marks(session, chunk, findings)
-    return len(published_jobs), older_grades
+        _compare_marks(session, dict(stated_jobs[start : start + _CHUNK_SIZE]), findings)
+    return grades, older_grades
 
 
-def _compare_submissions(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:
-    """Name grades that are now of another student or submission than in their statements."""
-    query = (
-        select(Job.id, Job.enrolment_id == SubmissionRow.enrolment_id, SubmissionRow, Enrolment.student)
-        .add_columns(AssignmentVersion.assignment, AssignmentVersion.version, Job.published_at)
-        .join(SubmissionRow, Job.submission_id == SubmissionRow.id)
-        .join(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
-        .join(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-        .where(Job.id.in_(entries_by_job))
-    )
-    for job_id, is_own, row, student, assignment, version, published_at in session.execute(query):
-        times = (format_moment(row.submitted_at or row.created_at), format_moment(published_at))
-        actual = (student, assignment, version, row.attempt, *times, row.sha256)
-        entry = entries_by_job[job_id]
-        pairs = zip(_SUBMISSION_PARTS, actual, entry.submission, strict=True)
-        changed = [name for name, now, stated in pairs if now != stated]
-        if changed or not is_own:
-            what = changed[0] if changed else "student"
-            findings.name_grade(entry.number, job_id, f"was moved: its {what} is not that of entry {entry.number}")
+def _compare_submission(row: Any, entry: _Entry, findings: _Findings) -> None:
+    """Name a grade that is now of another student or submission than in its statement."""
+    times = (format_moment(row.submitted_at or row.created_at), format_moment(row.published_at))
+    actual = (row.student, row.assignment, row.version, row.attempt, *times, row.sha256)
+    if actual == entry.submission and row.is_own:
+        return
+    pairs = zip(_SUBMISSION_PARTS, actual, entry.submission, strict=True)
+    what = next((name for name, now, stated in pairs if now != stated), "student")
+    findings.name_grade(entry.number, row.id, f"was moved: its {what} is not that of entry {entry.number}")
 
 
-def _compare_marks(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:
-    for job_id, facts in load_marks_facts(session, entries_by_job).items():
-        entry = entries_by_job[job_id]
-        opened_facts = facts.open_facts(entry.opening_key, *_MARKS_KINDS)
-        actual, stated = commit_to_facts(opened_facts), entry.commitments
-        changed = [kind for kind in _MARKS_KINDS if actual[kind.value] != stated.get(kind)]
-        if changed:
-            what = _name_difference(opened_facts, changed[0], stated.get(changed[0]))
+def _compare_marks(session: Session, entries_by_job: dict[str, _Entry], findings: _Findings) -> None:
+    """Name grades whose marks are not those of their statements. They are in the order of ids."""
+    first, last = next(iter(entries_by_job)), next(reversed(entries_by_job))
+    job_ids = select(Job.id).where(Job.id.between(first, last))
+    for job_id, facts in load_marks_facts(session, job_ids).items():
+        entry = entries_by_job.get(job_id)
+        if entry is None:
+            continue
+        actual, stated = facts.commit(entry.opening_key, *_MARKS_KINDS), entry.commitments
+        if actual != stated:
+            changed = next(kind for kind in _MARKS_KINDS if actual[kind.value] != stated.get(kind.value))
+            what = _name_difference(facts.open_facts(entry.opening_key, changed), changed, stated.get(changed.value))
             findings.name_grade(entry.number, job_id, f"was changed: its {what} is not that of entry {entry.number}")
 
 

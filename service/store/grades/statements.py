@@ -8,12 +8,22 @@ from __future__ import annotations
 import secrets
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
+from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
-from service.statements.facts import OPENING_KEY_BYTES, Fact, FactKind, OpenFact, commit_to_facts, open_fact
+from service.statements.facts import (
+    OPENING_KEY_BYTES,
+    Fact,
+    FactKind,
+    OpenFact,
+    commit_to_values,
+    encode_value,
+    open_fact,
+)
 from service.statements.statement import Change, format_moment, name_entries
 from service.store.grades import overrides
 from service.store.statement_log import Draft, append_entries, load_newest_entry
@@ -22,23 +32,29 @@ from service.store.tables.courses import AssignmentVersion, Course
 from service.store.tables.grades import CriterionResultRow, TrialRow
 from service.store.tables.people import Enrolment
 from service.store.tables.submissions import Job, SubmissionRow
+from sim.readers.json_text import read_json
 
 _CHUNK_SIZE = 200
+_CACHE_SIZE = 10_000
 
 
 @dataclass(slots=True)
 class GradeFacts:
-    """The values of the facts of a stored grade as it counts, by kind."""
+    """The values of the facts of a stored grade as it counts, by kind, each as the JSON of its commitment."""
 
-    values: dict[FactKind, list[Any]] = field(default_factory=lambda: {kind: [] for kind in FactKind})
+    values: dict[FactKind, list[str]] = field(default_factory=lambda: {kind: [] for kind in FactKind})
 
     def open_facts(self, opening_key: bytes, *kinds: FactKind) -> tuple[OpenFact, ...]:
         """Return the facts of these kinds with their salts."""
         return tuple(
-            open_fact(Fact(kind, number, value), opening_key)
+            open_fact(Fact(kind, number, read_json(value)), opening_key)
             for kind in kinds
             for number, value in enumerate(self.values[kind], 1)
         )
+
+    def commit(self, opening_key: bytes, *kinds: FactKind) -> dict[str, Any]:
+        """Return the commitments of a statement to the facts of these kinds."""
+        return {kind.value: commit_to_values(kind, self.values[kind], opening_key) for kind in kinds}
 
 
 def state_publication(session: Session, job_ids: Collection[str]) -> None:
@@ -86,29 +102,40 @@ def load_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFac
     query = select(*columns).where(trial.job_id.in_(job_ids)).order_by(trial.job_id, trial.position)
     for job_id, scenario, index, seed, recording_sha256 in session.execute(query):
         value = {"scenario": scenario, "index": index, "seed": seed, "recording_sha256": recording_sha256}
-        facts_by_job[job_id].values[FactKind.TRIAL].append(value)
+        facts_by_job[job_id].values[FactKind.TRIAL].append(encode_value(value))
     return facts_by_job
 
 
-def load_marks_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFacts]:
-    """Return the facts of grades by job, without those on trials."""
+def load_marks_facts(session: Session, job_ids: Collection[str] | Select[str]) -> dict[str, GradeFacts]:
+    """Return the facts of grades by job, without those on trials. A query of the ids takes less time than many ids."""
     facts_by_job = {}
     totals_query = select(Job.id, Job.marks, Job.max_marks, Job.provisional).where(Job.id.in_(job_ids))
     for job_id, marks, max_marks, provisional in session.execute(totals_query):
         facts_by_job[job_id] = GradeFacts()
-        total = {"marks": _format(marks), "max_marks": _format(max_marks), "provisional": provisional}
-        facts_by_job[job_id].values[FactKind.TOTAL].append(total)
+        facts_by_job[job_id].values[FactKind.TOTAL].append(_encode_total(marks, max_marks, provisional))
     overrides_by_job = overrides.load_overrides(session, job_ids)
     row = CriterionResultRow
     columns = (row.job_id, row.criterion, row.title, row.marks, row.max_marks, row.visibility)
     query = select(*columns).where(row.job_id.in_(job_ids)).order_by(row.job_id, row.position)
-    for job_id, criterion, title, marks, worth, visibility in session.execute(query):
+    for job_id, criterion, title, marks, worth, visibility in session.connection().execute(query):
         override = overrides_by_job.get(job_id, {}).get(criterion)
         effective_marks, max_marks = (marks, worth) if override is None else override.compute_marks(worth)
-        value = {"id": criterion, "title": title, "marks": _format(effective_marks), "max_marks": _format(max_marks)}
+        value = _encode_criterion(criterion, title, effective_marks, max_marks, override is not None)
         kind = FactKind.HIDDEN_CRITERION if visibility == "hidden" else FactKind.CRITERION
-        facts_by_job[job_id].values[kind].append({**value, "set_by_staff": override is not None})
+        facts_by_job[job_id].values[kind].append(value)
     return facts_by_job
+
+
+# Students of a class get the same marks for the same criteria again and again.
+@lru_cache(_CACHE_SIZE)
+def _encode_total(marks: Decimal, max_marks: Decimal, is_provisional: bool) -> str:
+    return encode_value({"marks": _format(marks), "max_marks": _format(max_marks), "provisional": is_provisional})
+
+
+@lru_cache(_CACHE_SIZE)
+def _encode_criterion(criterion: str, title: str, marks: Decimal, max_marks: Decimal, is_set_by_staff: bool) -> str:
+    value = {"id": criterion, "title": title, "marks": _format(marks), "max_marks": _format(max_marks)}
+    return encode_value({**value, "set_by_staff": is_set_by_staff})
 
 
 _SELECT_SUBJECT = (
@@ -133,13 +160,13 @@ def _build_draft(row: Any, facts: GradeFacts) -> Draft:
         "graded_at": None if job.graded_at is None else format_moment(job.graded_at),
         "published_at": format_moment(job.published_at),
         "grader": {"version": job.grader_version, "sha256": job.grader_sha256},
-        "commitments": commit_to_facts(facts.open_facts(opening_key, *FactKind)),
+        "commitments": facts.commit(opening_key, *FactKind),
     }
     subjects = {"submission": submission.sha256}
     return Draft(Change.PUBLISHED, subjects, predicate, submission.id, job.id, opening_key)
 
 
-def _format(marks: Any) -> str:
+def _format(marks: Decimal) -> str:
     """Return marks as text without trailing zeros: databases store the digits differently."""
     return f"{marks.normalize():f}"
 
