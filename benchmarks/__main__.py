@@ -1,7 +1,7 @@
 """Prints each measurement beside its budget. Ratios and CPU time, so that a busy machine changes little.
 
-``python -m benchmarks queue rows`` measures these two alone. ``chaos``, ``capacity``, ``costs``, ``plans`` and
-``pools`` are no part of the table (docs/performance.md).
+``python -m benchmarks queue rows`` measures these two alone. ``chaos``, ``capacity``, ``costs``, ``loads``,
+``plans`` and ``pools`` are no part of the table (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from benchmarks import (
+    appeal,
     calibration,
     capacity,
     chaos,
@@ -21,6 +22,7 @@ from benchmarks import (
     costs,
     grading,
     growth,
+    loads,
     memory,
     notebook_cells,
     original,
@@ -31,6 +33,7 @@ from benchmarks import (
     rows,
     sandbox,
     simulator,
+    statement_log,
     submission,
     table,
     web,
@@ -52,7 +55,9 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
         "ready": ready.measure,
         "submission": submission.measure,
         "sandbox": sandbox.measure,
+        "appeal": appeal.measure,
         "rows": rows.measure,
+        "statement_log": statement_log.measure,
         "claims": claims.measure,
         "queue": queue.measure,
         "web": web.measure,
@@ -62,7 +67,14 @@ GROUPS: Mapping[str, Callable[[int], list[Measurement]]] = MappingProxyType(
 #: The groups of ``--quick``, which together take less than a minute.
 _QUICK = ("calibration", "commands", "grading", "simulator", "original", "growth")
 _OTHERS: Mapping[str, Callable[[list[str]], int]] = MappingProxyType(
-    {"capacity": capacity.main, "chaos": chaos.main, "costs": costs.main, "plans": rows.main, "pools": pools.main}
+    {
+        "capacity": capacity.main,
+        "chaos": chaos.main,
+        "costs": costs.main,
+        "loads": loads.main,
+        "plans": rows.main,
+        "pools": pools.main,
+    }
 )
 
 
