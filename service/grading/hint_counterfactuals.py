@@ -41,6 +41,8 @@ _FACTORS = tuple(sorted((*_STEP_FACTORS, *_ROUND_FACTORS), key=lambda each: abs(
 _MAX_TICKS = 250_000
 _MAX_LINES = 6
 _MIN_PASS_SHARE = 0.999
+#: Readings of the robot's own wheels and gyro, which scale with its path. The others depend on where the robot is.
+_OWN_READINGS = frozenset({"angle", "position"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,11 @@ def _collect_path_trials(criterion: Criterion, shown: Sequence[TrialResult], lis
     """Return the trials of the criterion; empty if their paths depend on more than the program's numbers."""
     trials = [each for each in shown if not criterion.scenarios or each.scenario in criterion.scenarios]
     is_unfit = any(each.recording.partner is not None or not each.recording.places for each in trials)
-    return [] if is_unfit or any(each.has_token(*PROPERTIES) for each in listing.code.statements) else trials
+    return (
+        []
+        if is_unfit or any(each.has_token(*(PROPERTIES - _OWN_READINGS)) for each in listing.code.statements)
+        else trials
+    )
 
 
 def _find_best_change(
@@ -160,6 +166,7 @@ def _choose_factor(passing_factors: list[float]) -> float:
 def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_Change]:
     """Yield the lines that moved the robot: single calls in functions first, then each moving line."""
     code = listing.code
+    has_own_readings = any(each.has_token(*_OWN_READINGS) for each in code.statements)
     inner_lines, outer_lines = zip(*(_find_lines_at_ticks(each.recording) for each in trials), strict=True)
     known_keys: set[bytes] = set()
     for lines in (outer_lines, inner_lines):
@@ -168,6 +175,10 @@ def _collect_changes(listing: Listing, trials: list[TrialResult]) -> Iterator[_C
             ticks = tuple(each == line for each in lines)
             key = b"".join(each.tobytes() for each in ticks)
             if statement is None or key in known_keys or not _has_moved(trials, ticks):
+                continue
+            # The number of such a loop is in its condition, and not in the line that waits.
+            loops = (each for each in (statement, *code.list_enclosing(statement)) if each.keyword == "while")
+            if has_own_readings and any(loops):
                 continue
             known_keys.add(key)
             if lines is inner_lines and not (
@@ -292,6 +303,15 @@ def _describe_change(change: _Change, factor: float, failure: str) -> str:
         fix: str = Sentence("Let the robot move the other way here: change the sign of the speed or steering")
     elif amount:
         fix = suggest_number(amount, amount * factor)
+    elif change.call is not None and (constant := _find_constant(change.listing, change.call)) is not None:
+        line, name, present, is_divisor = constant
+        fix = Sentence(
+            "Change %(name)s in line %(line)s from %(present)g to about %(better)s",
+            name=name,
+            line=line,
+            present=present,
+            better=format_rounded(present / factor if is_divisor else present * factor),
+        )
     elif factor > 1:
         fix = Sentence(
             "Let the robot move about %(factor).2g times as far or turn as much here, more than now", factor=factor
@@ -309,6 +329,19 @@ def _find_amount(listing: Listing, call: CallInCode) -> float | None:
         return listing.code.number(call.arguments[-1]) if call.arguments else None
     numbers = _list_numbers(listing, call)
     return numbers[0] if len(numbers) == 1 else None
+
+
+def _find_constant(listing: Listing, call: CallInCode) -> tuple[int, str, float, bool] | None:
+    """Return the line, the name and the number of the constant that scales a limited move, and if it divides."""
+    tokens = call.arguments[-1] if call.arguments and call.name.rpartition(".")[2] in LIMITED_MOVES else ()
+    if len(tokens) != 3 or tokens[1] not in ("*", "/"):
+        return None
+    for name in (tokens[2],) if tokens[1] == "/" else (tokens[0], tokens[2]):
+        definition = next((each for each in listing.code.statements if each.target == name), None)
+        number = listing.code.number((name,))
+        if definition is not None and number:
+            return definition.line, name, number, tokens[1] == "/"
+    return None
 
 
 def suggest_number(present: float, better: float) -> str:

@@ -16,7 +16,7 @@ from service.grading.hint_clues import Clues, F, Listing, name_cell
 from service.grading.hint_code import CallInCode, Statement, join_tokens
 from service.grading.hint_conditions import advise_on_leaving
 from service.grading.hint_counterfactuals import suggest_number
-from service.grading.hint_steering import describe_steering_mistake
+from service.grading.hint_steering import describe_steering_mistake, describe_turn_from_line
 from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
 from service.grading.judging.message_parts import quote_text
@@ -372,7 +372,9 @@ def _hint_about_steering(failure: _Failure) -> str:
     steering_pair = next(((each, call) for each in failure.lines for call in each.calls if _is_steering(call)), None)
     if steering_pair is None:
         return ""
-    mistake = describe_steering_mistake(failure.listing, *steering_pair)
+    mistake = describe_steering_mistake(failure.listing, *steering_pair) or describe_turn_from_line(
+        failure.listing, *steering_pair, failure.criterion, failure.clues.recordings_by_trial.values()
+    )
     if mistake:
         return mistake
     return Sentence(

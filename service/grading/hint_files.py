@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 
 from service.grading.hint_clues import Clues, Listing, name_cell
-from service.grading.hint_code import Statement
+from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_structure import DRIVING_CRITERIA, has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES
 from service.language import translatable
@@ -189,9 +189,27 @@ def _hint_about_redefinitions(process: list[Listing]) -> Iterator[str]:
                     )
                     return
                 definitions[name] = listing, statement
+            elif statement.target in definitions and _replaces_function(statement, process):
+                earlier_listing, head = definitions[statement.target]
+                yield Sentence(
+                    "%(place)s gives %(name)s another value, so the function in %(other_place)s is lost: %(code)s. "
+                    "Choose another name there",
+                    place=listing.locate(statement.line),
+                    name=statement.target,
+                    other_place=earlier_listing.locate(head.line),
+                    code=join_tokens(statement.tokens),
+                )
+                return
             elif not statement.indent:
                 for called_name in {call.name for call in statement.calls} & definitions.keys():
                     del definitions[called_name]
+
+
+def _replaces_function(statement: Statement, process: list[Listing]) -> bool:
+    """Return whether an assignment at the left edge makes a text or number of a name that a function calls."""
+    is_literal = len(statement.tokens) == 3 and not is_name(statement.tokens[2])
+    inner_calls = (call for each in process for one in each.code.statements if one.indent for call in one.calls)
+    return is_literal and not statement.indent and any(call.name == statement.target for call in inner_calls)
 
 
 def _is_driving(statement: Statement) -> bool:

@@ -106,6 +106,38 @@ def hint_about_missing_responder(clues: Clues) -> Iterator[str]:
     yield Sentence(template, file=file)
 
 
+def hint_about_helper_as_responder(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``roboSim.pyresponder = focus``, if focus is a function that the responder itself calls."""
+    if not clues.lost:
+        return
+    functions = {
+        each.tokens[1]: (listing, each) for listing in clues.responders for each in listing.code.list_functions()
+    }
+    callers = {
+        call.name: name
+        for name, (listing, head) in functions.items()
+        if _RESPONDER.match(name)
+        for each in listing.code.list_body(head)
+        for call in each.calls
+    }
+    assignments = [
+        (listing, each)
+        for listing in clues.responders
+        for each in listing.code.statements
+        if each.tokens[:4] == ("roboSim", ".", "pyresponder", "=") and len(each.tokens) == 5
+    ]
+    for listing, statement in assignments[-1:]:
+        name = statement.tokens[4]
+        if name in functions and name in callers and not _RESPONDER.match(name):
+            yield Sentence(
+                "%(place)s makes %(name)s the responder, a function that %(right)s calls. Write roboSim.pyresponder = "
+                "%(right)s",
+                place=listing.locate(statement.line),
+                name=name,
+                right=callers[name],
+            )
+
+
 def hint_about_uncallable_responder(clues: Clues) -> Iterator[str]:
     """Yield a hint on a responder that does not take exactly one argument, or is not a function."""
     for fault in clues.faults:

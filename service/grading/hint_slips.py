@@ -20,6 +20,7 @@ from service.grading.hint_operands import (
     check_second_text,
 )
 from service.grading.hint_tables import READINGS
+from service.grading.hint_updates import UPDATE_CHECKS
 from service.grading.hint_value_sources import describe_overwritten_list, is_overwritten_list
 from service.grading.hint_variables import (
     check_early_step,
@@ -381,4 +382,5 @@ _SLIP_CHECKS: Sequence[_SlipCheck] = (
     _check_empty_range,
     _check_unused_value,
     _check_chained_ifs,
+    *UPDATE_CHECKS,
 )

@@ -32,6 +32,7 @@ from service.grading import (
     hint_recognition,
     hint_repetition,
     hint_responder,
+    hint_rules,
     hint_scale,
     hint_signatures,
     hint_skipped_loops,
@@ -61,6 +62,7 @@ _FILE_RULES: Sequence[Rule] = (
 )
 #: Rules that explain an error better than its message. The message is used if none of them applies.
 _ERROR_RULES: Sequence[Rule] = (
+    hint_responder.hint_about_helper_as_responder,
     hint_formats.hint_about_magics,
     hint_errors.hint_about_cell_errors,
     hint_responder.hint_about_misnamed_function,
@@ -135,6 +137,8 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_timing.hint_about_short_waits,
     hint_functions.hint_about_functions,
     hint_functions.hint_about_hidden_prefix,
+    hint_rules.hint_about_rules,
+    hint_rules.hint_about_missing_branch,
     hint_formulas.hint_about_division,
     hint_answers.hint_about_image_command,
     hint_answers.hint_about_none_answers,

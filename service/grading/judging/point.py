@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from service.grading.findings import OtherSide
 from service.grading.grade import CriterionResult, Measure, TrialResult
 from service.grading.judging.geometry import (
     compute_headings,
@@ -74,6 +75,7 @@ def judge_closest(criterion: Closest, trial: TrialResult) -> Outcome:
                 Sentence(other_turn if first_turn else no_turn, point=point),
                 *find_place(recording, first_turn[0] if first_turn else 0),
                 measures=measures,
+                findings=(OtherSide(),) if first_turn else (),
             )
     if criterion.distance is not None and not criterion.distance[0] <= min_distance <= criterion.distance[1]:
         low, high = criterion.distance
