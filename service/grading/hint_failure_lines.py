@@ -14,6 +14,7 @@ from service.grading.findings import ExtraText, LateResend, MissingAnswer, Other
 from service.grading.grade import Evidence
 from service.grading.hint_clues import Clues, F, Listing, name_cell
 from service.grading.hint_code import CallInCode, Statement, join_tokens
+from service.grading.hint_colours import find_required_colour
 from service.grading.hint_conditions import advise_on_leaving
 from service.grading.hint_counterfactuals import suggest_number
 from service.grading.hint_steering import describe_steering_mistake, describe_turn_from_line
@@ -21,7 +22,6 @@ from service.grading.hint_structure import has_motor_call
 from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
 from service.grading.judging.message_parts import quote_text
 from sim.recording import Recording
-from sim.recording_values import rebuild_floor
 from sim.sentences import Sentence, join_sentences, make_clause
 from submissions.criteria import Criterion
 from submissions.criteria.collecting import Collects
@@ -339,25 +339,11 @@ def _describe_readings(failure: _Failure) -> tuple[str, str]:
 
 def _describe_required_reading(criterion: StopOn, recording: Recording) -> str:
     """Return what the light sensor reads in the required place; empty if unknown."""
-    if criterion.rgb is not None:
-        return _format_colour(criterion.rgb)
-    if criterion.reflected is not None:
+    if criterion.rgb is None and criterion.reflected is not None:
         minimum, maximum = criterion.reflected
         return Sentence("%(least)g to %(most)g %%", least=minimum, most=maximum)
-    position = criterion.near
-    if criterion.zone is not None:
-        left, bottom, right, top = criterion.zone
-        position = (left + right) / 2, min(max(recording.end.y, bottom), top)
-    floor = rebuild_floor(recording)
-    if position is None or floor is None:
-        return ""
-    height, width = floor.pixels.shape[:2]
-    column, row = round(position[0]), height - 1 - round(position[1])
-    # A place may lie beside the floor, and a robot may end there.
-    if not (0 <= column < width and 0 <= row < height):
-        return ""
-    pixel = floor.pixels[row, column]
-    return _format_colour([float(each) for each in pixel[:3]])
+    colour = find_required_colour(criterion, recording)
+    return "" if colour is None else _format_colour(colour)
 
 
 def _format_colour(rgb: Sequence[float]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from service.grading.hint_clues import Listing
 from service.grading.hint_code import CallInCode, Statement, is_name, join_tokens
-from service.grading.judging.geometry import compute_positions, track_line_progress
+from service.grading.judging.geometry import compute_headings, compute_positions, track_line_progress
 from sim.recording import Recording
 from sim.sentences import Sentence
 from submissions.criteria.line import Follows, Laps
@@ -89,8 +89,8 @@ def describe_turn_from_line(
 
 def _measure_leaving_turn(criterion: Follows | Laps, recording: Recording) -> float | None:
     """Return by how many degrees a robot turned away from the line while it left it; None if it began elsewhere."""
-    points = compute_positions(recording, criterion.of) if isinstance(criterion, Follows) else None
-    points = compute_positions(recording) if points is None else points
+    part = criterion.of if isinstance(criterion, Follows) else "robot"
+    points = compute_positions(recording, part)
     progress = track_line_progress(criterion.line, points, criterion.within)
     if progress is None or progress.first > 0:
         return None
@@ -99,7 +99,7 @@ def _measure_leaving_turn(criterion: Follows | Laps, recording: Recording) -> fl
     if not len(left_rows):
         return None
     row, count = int(left_rows[0]), round(_TURN_SECONDS * recording.ticks.per_second)
-    headings = recording.ticks.heading
+    headings = compute_headings(recording)
     turn = float(headings[row] - headings[max(row - count, 0)])
     return turn if offsets[row] > 0 else -turn
 

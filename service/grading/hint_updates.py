@@ -238,7 +238,7 @@ def _is_step(statement: Statement, name: str) -> bool:
     """Return whether a statement only adds to a name."""
     tokens = statement.tokens
     if tokens.count(name) == 1:
-        return tokens[0] == name and tokens[1:3] in ((".", "append"), (".", "add")) or tokens[:2] == (name, "+=")
+        return (tokens[0] == name and tokens[1:3] in ((".", "append"), (".", "add"))) or tokens[:2] == (name, "+=")
     return tokens.count(name) == 2 and tokens[:4] == (name, "=", name, "+")
 
 

@@ -17,7 +17,9 @@ from service.grading import (
     hint_answers,
     hint_braces,
     hint_cause_lines,
+    hint_colours,
     hint_counterfactuals,
+    hint_driving,
     hint_errors,
     hint_failure_lines,
     hint_files,
@@ -95,6 +97,7 @@ _MESSAGE_RULES: Sequence[Rule] = (
 _LIMIT_RULES: Sequence[Rule] = (
     hint_structure.hint_about_stop_in_loop,
     hint_formulas.hint_about_gyro_direction,
+    hint_driving.hint_about_stop_before_loop,
     hint_loops.hint_about_limits,
 )
 #: Rules for programs that finished but did too little, the most certain first.
@@ -104,7 +107,10 @@ _STRUCTURE_RULES: Sequence[Rule] = (
     hint_structure.hint_about_replaced_function,
     hint_files.hint_about_redefined_functions,
     hint_structure.hint_about_uncalled_function,
+    hint_driving.hint_about_unwaited_move,
     hint_structure.hint_about_single_reading,
+    hint_colours.hint_about_opposite_condition,
+    hint_colours.hint_about_shared_colour,
     hint_skipped_loops.hint_about_skipped_loop,
     hint_structure.hint_about_discarded_value,
     hint_structure.hint_about_unindented_statement,
@@ -170,6 +176,9 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_values.hint_about_swallowed_flags,
     hint_values.hint_about_swapped_ports,
     hint_values.hint_about_swapped_atan2,
+    hint_driving.hint_about_radians,
+    hint_driving.hint_about_straight_turn,
+    hint_driving.hint_about_single_images,
     hint_repetition.hint_about_repeated_words,
     hint_repetition.hint_about_inner_loop,
     hint_repetition.hint_about_last_number,
