@@ -26,6 +26,7 @@ from submissions.criteria.logs import ImageLog
 from submissions.criteria.replies import Replies
 from submissions.criteria.reporting import Reports
 from submissions.criteria.unreliable_channel import FreshAnswers, Resends
+from submissions.raw_files import sanitise_name
 
 _KEY = re.compile(r"""["'](\w{2,40})["']\s*:""")
 _NONE_VALUE = re.compile(r"\bNone\b|\bnull\b")
@@ -37,6 +38,7 @@ _OBJECT_VALUE = re.compile(r"""['"](\w+)['"]: ([\[{])""")
 _PAIR = re.compile(r"\w+(?: , \w+)+\Z")
 #: The number of answers that show a constant shift.
 _MIN_SHIFTED_ANSWERS = 2
+_MAX_NAMED_KEYS = 3
 
 
 def hint_about_other_keys(clues: Clues) -> Iterator[str]:
@@ -361,3 +363,27 @@ def _describe_words_line(text: str, clues: Clues) -> str:
         if opening and pattern.search(line)
     ]
     return lines[0] if len(lines) == 1 else ""
+
+
+def advise_on_key_place(key: str, answer: str, clues: Clues) -> str:
+    """Return where a key is that the robot does not find in an answer, or the line of the answer that lacks it."""
+    value = parse_answer(answer)
+    keys = [str(each) for each in value] if isinstance(value, dict) else []
+    outer_key = next((each for each in keys if isinstance(value, dict) and _has_key(value[each], key)), "")
+    if outer_key:
+        return Sentence(
+            'It is inside "%(outer)s": write ["%(outer)s"]["%(key)s"].', outer=outer_key, key=sanitise_name(key)
+        )
+    line = describe_key_line(keys, clues)
+    if not line:
+        return ""
+    return Sentence(
+        'The answer has only %(keys)s: add "%(key)s" to it in %(line)s, or read one of these keys.',
+        keys=", ".join(quote_text(each) for each in keys[:_MAX_NAMED_KEYS]),
+        key=sanitise_name(key),
+        line=line,
+    )
+
+
+def _has_key(value: object, key: str) -> bool:
+    return isinstance(value, dict) and key in value

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from service.grading.fault_kinds import FaultKind, is_kind, read_values
+from service.grading.hint_answers import advise_on_key_place
 from service.grading.hint_clues import Clues, Listing, describe_fault_line, find_listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_error_advice import ADVICE
@@ -297,6 +298,9 @@ def _advise_on_key(fault: Fault, clues: Clues, *_: object) -> str:
         return Sentence('Did you mean "%(key)s"?', key=similar_keys[0])
     answer = next((text for text in reversed(clues.answers) if text.startswith("JSON::")), "")
     if fault.who == "program" and answer:
+        place_advice = advise_on_key_place(missing_key, answer, clues)
+        if place_advice:
+            return place_advice
         return Sentence(
             "Nothing is stored under this key. The responder answered %(answer)s: use one of its keys.",
             answer=quote_text(answer),

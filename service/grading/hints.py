@@ -21,6 +21,7 @@ from service.grading import (
     hint_counterfactuals,
     hint_driving,
     hint_errors,
+    hint_exchanges,
     hint_failure_lines,
     hint_files,
     hint_formats,
@@ -77,6 +78,7 @@ _ERROR_RULES: Sequence[Rule] = (
     hint_responder.hint_about_unqueued_answers,
     hint_signatures.hint_about_signatures,
     hint_slips.hint_about_missing_comma,
+    hint_exchanges.hint_about_all_channels,
 )
 #: Rules for the causes of errors.
 _MESSAGE_RULES: Sequence[Rule] = (
@@ -134,6 +136,12 @@ _RESULT_RULES: Sequence[Rule] = (
     hint_scale.hint_about_raw_report,
     hint_scale.hint_about_wrong_scale,
     hint_recognition.hint_about_pixel_step,
+    hint_exchanges.hint_about_smallest_chance,
+    hint_exchanges.hint_about_exchanged_axes,
+    hint_exchanges.hint_about_near_prefix,
+    hint_exchanges.hint_about_counted_rest,
+    hint_exchanges.hint_about_exchanged_words,
+    hint_exchanges.hint_about_returned_object,
     hint_passes.hint_about_hasty_resending,
     hint_passes.hint_about_zero_pass,
     hint_passes.hint_about_added_factor,
