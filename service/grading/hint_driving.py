@@ -151,6 +151,29 @@ def hint_about_single_images(clues: Clues) -> Iterator[str]:
             return
 
 
+def hint_about_hurried_images(clues: Clues) -> Iterator[str]:
+    """Yield a hint on a loop that sends images while the robot drives, and does not wait between them."""
+    for listing, loop in collect_statements(clues):
+        body = listing.code.list_body(loop) if loop.keyword == "for" else ()
+        is_driving = any(has_motor_call(each, CONTINUOUS_MOVES) for each in listing.code.statements[: loop.number])
+        sent = next(
+            (each for each in body if each.has_token('"IMG_DATA"', "'IMG_DATA'") and each.has_token("print")), None
+        )
+        is_waiting = any(
+            each.has_token("sleep", "pyState", "while", "wait") or has_motor_call(each, LIMITED_MOVES) for each in body
+        )
+        calls = {call.name for each in body for call in each.calls}
+        is_waiting = is_waiting or any(each.tokens[1] in calls for each in listing.code.list_functions())
+        if sent is not None and is_driving and not is_waiting:
+            yield Sentence(
+                "%(place)s sends all images at once, because nothing in the loop of line %(line)s waits. Add "
+                "time.sleep(0.2) below it",
+                place=listing.locate(sent.line),
+                line=loop.line,
+            )
+            return
+
+
 def _is_pair_call(call: CallInCode, methods: frozenset[str]) -> bool:
     owner, _, method = call.name.rpartition(".")
     return owner in _PAIRS and method in methods

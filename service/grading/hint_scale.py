@@ -5,6 +5,7 @@ The number comes from what the program printed or said.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -13,6 +14,7 @@ from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_differences import describe_factor
 from service.grading.hint_loops import describe_reading
 from service.grading.hint_structure import collect_statements
+from sim.recording_values import get_recorded_robot
 from sim.sentences import Sentence
 from submissions.criteria.reporting import Reports
 
@@ -38,7 +40,8 @@ def hint_about_wrong_scale(clues: Clues) -> Iterator[str]:
         calculation = _find_calculation(clues)
         if number <= 0 or calculation is None:
             continue
-        advice = describe_factor((expected - criterion.leeway) / number, (expected + criterion.leeway) / number)
+        factors = (expected - criterion.leeway) / number, (expected + criterion.leeway) / number
+        advice = describe_factor(*factors) or _describe_wheel_factor(*factors, clues)
         if advice:
             listing, statement = calculation
             yield Sentence(
@@ -49,6 +52,23 @@ def hint_about_wrong_scale(clues: Clues) -> Iterator[str]:
                 advice=advice,
             )
             return
+
+
+def _describe_wheel_factor(minimum: float, maximum: float, clues: Clues) -> str:
+    """Return advice on degrees of the wheels where millimetres are expected; empty for any other number."""
+    reads_wheels = any(each.has_token("position") for _, each in collect_statements(clues))
+    is_converted = any(each.has_token("pi") or "3.14" in "".join(each.tokens) for _, each in collect_statements(clues))
+    recording = next(iter(clues.recordings), None)
+    if not reads_wheels or is_converted or recording is None:
+        return ""
+    diameter = get_recorded_robot(recording).wheel_diameter
+    if not minimum <= math.pi * diameter / 360 <= maximum:
+        return ""
+    return Sentence(
+        "It is in degrees of the wheels. For millimetres write / 360 * math.pi * %(diameter)g behind it, in brackets "
+        "if needed, with import math above",
+        diameter=diameter,
+    )
 
 
 def hint_about_raw_report(clues: Clues) -> Iterator[str]:
@@ -73,6 +93,27 @@ def hint_about_raw_report(clues: Clues) -> Iterator[str]:
                     number=numbers[0],
                     expected=expected,
                     range=describe_reading(reading),
+                )
+                return
+
+
+def hint_about_colour_number(clues: Clues) -> Iterator[str]:
+    """Yield a hint on ``color``, a single number, that is reported where red, green and blue are expected."""
+    for criterion in clues.lost:
+        rows = criterion.expected if isinstance(criterion, Reports) and criterion.source != "reply" else ()
+        if isinstance(rows, str) or not rows or len(rows[0]) != 3 or any(isinstance(each, str) for each in rows[0]):
+            continue
+        for listing, statement in collect_statements(clues):
+            tokens = statement.tokens
+            index = next((at for at, token in enumerate(tokens) if token in ("color", "color_name") and at > 1), None)
+            is_output = any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls) or statement.target
+            if index is not None and is_output and tokens[index - 1] == ".":
+                yield Sentence(
+                    "%(place)s reads %(reading)s, which is one value for the whole colour. Write %(sensor)s.rgb for "
+                    "the three numbers of red, green and blue",
+                    place=listing.locate(statement.line),
+                    reading=tokens[index],
+                    sensor=tokens[index - 2],
                 )
                 return
 

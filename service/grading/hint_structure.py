@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import LOOPS, CodeStatements, Statement, is_name, join_tokens
 from service.grading.hint_tables import ACTIONS, CONTINUOUS_MOVES, LIMITED_MOVES, PROPERTIES
-from sim.sentences import Sentence
+from service.language import translatable
+from sim.sentences import Sentence, join_with_and
 from submissions.criteria.code import Functions
 from submissions.criteria.drawing import Drawing
 from submissions.criteria.line import Follows, Laps
@@ -43,12 +44,27 @@ def hint_about_missing_brackets(clues: Clues) -> Iterator[str]:
             name in function_names
             or (last_token in ACTIONS and (len(statement.tokens) > 1 or name in _OUTPUT_FUNCTIONS))
         ):
+            head = next((each for each in listing.code.list_functions() if each.tokens[1] == name), None)
+            parameters = [] if head is None else _list_required_parameters(head)
+            template = (
+                translatable(
+                    "%(place)s names %(name)s without brackets, so it is not called. Write %(name)s(...), with a value "
+                    "for %(parameters)s"
+                )
+                if parameters
+                else translatable("%(place)s names %(name)s without brackets, so it is not called. Write %(name)s()")
+            )
             yield Sentence(
-                "%(place)s names %(name)s without brackets, so it is not called. Write %(name)s()",
-                place=listing.locate(statement.line),
-                name=name,
+                template, place=listing.locate(statement.line), name=name, parameters=join_with_and(parameters)
             )
             return
+
+
+def _list_required_parameters(head: Statement) -> list[str]:
+    """Return the parameters of a function that have no value of their own."""
+    end = len(head.tokens) - 1 - head.tokens[::-1].index(")") if ")" in head.tokens else 0
+    following = zip(head.tokens[3:end], (*head.tokens[4:end], ","), strict=True)
+    return [name for name, sign in following if is_name(name) and sign == ","]
 
 
 def hint_about_replaced_function(clues: Clues) -> Iterator[str]:
