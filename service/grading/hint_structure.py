@@ -63,8 +63,8 @@ def hint_about_missing_brackets(clues: Clues) -> Iterator[str]:
 def _list_required_parameters(head: Statement) -> list[str]:
     """Return the parameters of a function that have no value of their own."""
     end = len(head.tokens) - 1 - head.tokens[::-1].index(")") if ")" in head.tokens else 0
-    following = zip(head.tokens[3:end], (*head.tokens[4:end], ","), strict=True)
-    return [name for name, sign in following if is_name(name) and sign == ","]
+    pairs = zip(head.tokens[3:end], head.tokens[4 : end + 1], strict=True)
+    return [name for name, sign in pairs if is_name(name) and sign in (",", ")")]
 
 
 def hint_about_replaced_function(clues: Clues) -> Iterator[str]:
