@@ -34,12 +34,13 @@ Colour = tuple[float, float, float]
 def hint_about_opposite_condition(clues: Clues) -> Iterator[str]:
     """Yield a hint on a robot that never moved because its loop asks for the opposite of the light at the start."""
     recording = next(iter(clues.recordings), None)
-    if recording is None or not clues.is_stationary:
+    if recording is None or not (clues.is_stationary or clues.seconds <= _SHORT_RUN_SECONDS):
         return
     for listing, statement in collect_statements(clues):
         is_start = statement.keyword == "while" and statement.parent < 0
         body = listing.code.list_body(statement) if is_start else ()
-        if not any(has_motor_call(each, CONTINUOUS_MOVES | LIMITED_MOVES) for each in body):
+        earlier = listing.code.statements[: statement.number]
+        if not any(has_motor_call(each, CONTINUOUS_MOVES | LIMITED_MOVES) for each in (*earlier, *body)) or not body:
             continue
         comparisons = list(_split_comparisons(statement.condition))
         readings = [_read_operand(listing.code, left, recording) for left, _, _ in comparisons]

@@ -16,6 +16,10 @@ ADVICE: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             translatable("Write json.dumps(...) around the object."),
         ),
         (
+            r'can only concatenate str \(not "list".*\n.*(?:pyState|messages|answer)',
+            translatable("The answer has a whole list here. Let the responder send one value of it."),
+        ),
+        (
             r"can only concatenate str|must be str, not",
             translatable("Convert other values with str(), or use an f-string."),
         ),

@@ -59,6 +59,9 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
 
 def _describe_other_return(wrong: WrongReturn, clues: Clues) -> str:
     """Return the line with the text that was expected, if one text in quotes came in place of another."""
+    missing = _describe_missing_literal(wrong, clues)
+    if missing:
+        return missing
     expected, actual = (_find_literal_statement(each, clues) for each in (wrong.expected, wrong.returned))
     if expected is None or actual is None or expected[0] is not actual[0]:
         return ""
@@ -76,6 +79,24 @@ def _describe_other_return(wrong: WrongReturn, clues: Clues) -> str:
         line=statement.line,
         first=heads[0].line,
         second=heads[1].line,
+    )
+
+
+def _describe_missing_literal(wrong: WrongReturn, clues: Clues) -> str:
+    """Return the lines with a text that came twice, if no line has the expected one."""
+    if not all(isinstance(each, str) and each for each in (wrong.expected, wrong.returned)):
+        return ""
+    values = [(each.line, each.tokens[-1][1:-1]) for one in clues.responders for each in one.code.statements]
+    lines = [line for line, text in values if text == wrong.returned]
+    if any(text == wrong.expected for _, text in values) or len(lines) != 2:
+        return ""
+    return Sentence(
+        "No line gives %(expected)s, and lines %(first)s and %(second)s both give %(actual)s. Write %(expected)s in one "
+        "of them",
+        expected=quote_text(str(wrong.expected)),
+        first=lines[0],
+        second=lines[1],
+        actual=quote_text(str(wrong.returned)),
     )
 
 
@@ -334,6 +355,14 @@ def _hint_about_function(name: str, criterion: Functions, clues: Clues) -> str:
         )
     stop = next((each for each in body if each.tokens == ("break",)), None)
     if stop is not None and wrong is not None and _is_shorter_list(wrong):
+        condition = listing.code.statements[stop.parent]
+        if condition.keyword == "if" and condition.tokens.count("!=") == 1:
+            return Sentence(
+                "%(place)s: break ends the loop as soon as %(condition)s. Write == in place of != in line %(line)s",
+                place=listing.locate(stop.line),
+                condition=join_tokens(condition.condition),
+                line=condition.line,
+            )
         return Sentence(
             "%(place)s: break ends the whole loop, so %(function)s returns too few values. To skip only this value, "
             "write continue instead of break",

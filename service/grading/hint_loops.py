@@ -179,7 +179,9 @@ def _explain_endless_loop(loop: Statement, code: CodeStatements, listing: Listin
         statement, effect, fix = step
         return _describe_effect(effect, statement, loop, listing, fix)
     names = {token for place, token in enumerate(condition) if is_name(token) and token not in _KEYWORDS}
-    has_reading = any(token in (".", "(") for token in condition)
+    openings = [place for place, token in enumerate(condition) if token == "("]
+    is_called = any(place and condition[place - 1] in names for place in openings)
+    has_reading = "." in condition or is_called
     assigned_names = {name for each in body for name in each.bound_names}
     calls = {call.name for each in body for call in each.calls}
     if (
@@ -262,19 +264,15 @@ def _describe_stale_reading(loop: Statement, body: Sequence[Statement], code: Co
         return ""
     assigned_names = {name for each in body for name in each.bound_names}
     for statement in code.statements[: loop.number]:
-        if (
-            statement.target
-            and _is_reading(statement)
-            and statement.target not in assigned_names
-            and any(one.has_token(statement.target) for one in body)
-        ):
+        names = statement.bound_names if _is_reading(statement) and "=" in statement.tokens else frozenset()
+        if names and not names & assigned_names and any(one.has_token(*names) for one in (*body, loop)):
             return _describe_single_reading(statement, body)
     return ""
 
 
 def _describe_single_reading(assignment: Statement, body: Sequence[Statement]) -> str:
     """Return that a value is read once, or that the loop reads it again under a name with other capital letters."""
-    other = next((each for each in body if each.target.lower() == assignment.target.lower()), None)
+    other = next((each for each in body if each.target and each.target.lower() == assignment.target.lower()), None)
     if other is not None:
         return Sentence(
             "%(name)s is read once, in line %(line)s, and not again. Line %(other)s writes %(wrong)s: write %(name)s, "
@@ -286,7 +284,7 @@ def _describe_single_reading(assignment: Statement, body: Sequence[Statement]) -
         )
     return Sentence(
         "%(name)s is read once, in line %(line)s, and not again. Repeat %(code)s in the loop",
-        name=assignment.target,
+        name=join_tokens(assignment.tokens[: assignment.tokens.index("=")]),
         line=assignment.line,
         code=join_tokens(assignment.tokens),
     )

@@ -12,6 +12,7 @@ from service.grading.hint_tables import CONTINUOUS_MOVES, PROPERTIES, READINGS
 from sim.sentences import Sentence
 
 _IMMEDIATE_SECONDS = 0.5
+_OWN_READINGS = frozenset({"position", "angle"})
 
 
 def hint_about_skipped_loop(clues: Clues) -> Iterator[str]:
@@ -27,9 +28,19 @@ def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
         is_driving = any(
             has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
         )
-        if statement.keyword == "while" and reading and is_driving:
+        if statement.keyword == "while" and reading and is_driving and not _is_true_at_zero(listing, statement):
             yield _explain_skipped_loop(listing, statement, reading)
             return
+
+
+def _is_true_at_zero(listing: Listing, loop: Statement) -> bool:
+    """Return whether a loop compares what the wheels or the gyro read, which is 0 at the start, so that it runs."""
+    tokens = loop.condition
+    index = next((at for at, token in enumerate(tokens) if token in ("<", "<=", ">", ">=")), None)
+    if index is None or not set(tokens[:index]) & _OWN_READINGS or {"-", "and", "or", "not"} & set(tokens):
+        return False
+    limit = listing.code.number(tokens[index + 1 :])
+    return limit is not None and (limit > 0 if tokens[index][0] == "<" else limit < 0)
 
 
 def _explain_skipped_loop(listing: Listing, loop: Statement, reading: str) -> tuple[str, str]:

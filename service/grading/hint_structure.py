@@ -149,7 +149,11 @@ def hint_about_single_reading(clues: Clues) -> Iterator[str]:
         is_driving = any(
             has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
         )
-        if is_reading and is_driving and not listing.code.list_enclosing_loops(statement):
+        is_waiting = any(
+            other.keyword == "while" and other.has_token(*PROPERTIES)
+            for other in listing.code.statements[: statement.number]
+        )
+        if is_reading and is_driving and not is_waiting and not listing.code.list_enclosing_loops(statement):
             yield Sentence(
                 "%(place)s reads the sensor only once, because if does not repeat. To repeat as long as this is "
                 "true, write while %(condition)s",
