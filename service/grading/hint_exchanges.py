@@ -99,10 +99,11 @@ def hint_about_exchanged_axes(clues: Clues) -> Iterator[str]:
     """Yield a hint on sums over rows and columns that are exchanged, so right is taken for downwards."""
     accuracies = [each.accuracy for each in (*clues.results, *clues.practice) if each.accuracy is not None]
     pairs = {(truth, answer) for each in accuracies for truth, answer, _ in each.confusion if answer is not None}
-    is_exchanged = any(
+    wrong_pairs = [pair for pair in pairs if pair[0] != pair[1]]
+    is_exchanged = len(wrong_pairs) > 1 and all(
         (first in truth and second in answer) or (second in truth and first in answer)
-        for truth, answer in pairs
-        for first, second in _SIDES
+        for truth, answer in wrong_pairs
+        for first, second in [next((sides for sides in _SIDES if sides[0] in truth or sides[1] in truth), ("", "?"))]
     )
     for listing in clues.responders if clues.lost and is_exchanged else ():
         if listing.find_line(_PREDICTION) is not None:

@@ -44,7 +44,10 @@ def hint_about_returned_values(clues: Clues) -> Iterator[str]:
         if not advice and isinstance(wrong.returned, list) and isinstance(next(iter(wrong.returned), None), list):
             advice = advise_on_difference([], [[]])
         advice = advice or _describe_other_return(wrong, clues)
-        value_statement = _find_literal_statement(wrong.returned, clues) or _find_value_statement(wrong.function, clues)
+        literals = _find_literal_statements(wrong.returned, clues)
+        value_statement = literals[0] if literals else _find_value_statement(wrong.function, clues)
+        if len(literals) > 1 and not _describe_missing_literal(wrong, clues):
+            value_statement = _find_value_statement(wrong.function, clues)
         if value_statement is not None:
             listing, statement = value_statement
             yield Sentence(
@@ -86,13 +89,13 @@ def _describe_missing_literal(wrong: WrongReturn, clues: Clues) -> str:
     """Return the lines with a text that came twice, if no line has the expected one."""
     if not all(isinstance(each, str) and each for each in (wrong.expected, wrong.returned)):
         return ""
-    values = [(each.line, each.tokens[-1][1:-1]) for one in clues.responders for each in one.code.statements]
-    lines = [line for line, text in values if text == wrong.returned]
-    if any(text == wrong.expected for _, text in values) or len(lines) != 2:
+    literals = _find_literal_statements(wrong.returned, clues)
+    if _find_literal_statements(wrong.expected, clues) or len(literals) != 2:
         return ""
+    lines = [each.line for _, each in literals]
     return Sentence(
-        "No line gives %(expected)s, and lines %(first)s and %(second)s both give %(actual)s. Write %(expected)s in one "
-        "of them",
+        "No line gives %(expected)s, and lines %(first)s and %(second)s both give %(actual)s. Write %(expected)s in "
+        "one of them",
         expected=quote_text(str(wrong.expected)),
         first=lines[0],
         second=lines[1],
@@ -149,15 +152,20 @@ def hint_about_narrow_except(clues: Clues) -> Iterator[str]:
 
 def _find_literal_statement(value: object, clues: Clues) -> tuple[Listing, Statement] | None:
     """Return the only statement that returns or assigns a text in quotes; None for other values."""
+    candidates = _find_literal_statements(value, clues)
+    return candidates[0] if len(candidates) == 1 else None
+
+
+def _find_literal_statements(value: object, clues: Clues) -> list[tuple[Listing, Statement]]:
+    """Return the statements that return or assign a text in quotes; empty for other values."""
     if not isinstance(value, str) or not value:
-        return None
-    candidates = [
+        return []
+    return [
         (listing, each)
         for listing in clues.responders
         for each in listing.code.statements
         if each.tokens[-1][:1] in ("'", '"') and each.tokens[-1][1:-1] == value
     ]
-    return candidates[0] if len(candidates) == 1 else None
 
 
 def _find_value_statement(name: str, clues: Clues) -> tuple[Listing, Statement] | None:
