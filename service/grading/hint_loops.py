@@ -364,7 +364,7 @@ def _find_source_token(tokens: Sequence[str], code: CodeStatements) -> str:
 def _describe_unchanged_names(names: Sequence[str], loop: Statement, code: CodeStatements, calls: set[str]) -> str:
     for name in names:
         assignment = next(
-            (each for each in code.statements[: loop.number] if each.target == name and _is_reading(each)), None
+            (each for each in code.statements[: loop.number] if name in each.bound_names and _is_reading(each)), None
         )
         if assignment is not None:
             return _describe_single_reading(assignment, code.list_body(loop))
