@@ -1,4 +1,4 @@
-"""Hints on programs that count from another number, in other steps, or repeat their moves too often or too seldom.
+"""Hints on programs that count from another number, in other steps, or repeat their moves once too seldom.
 
 The numbers come from what the robot said, or from the finding on the path.
 """
@@ -17,6 +17,7 @@ from service.grading.hint_tables import LIMITED_MOVES
 from sim.sentences import Sentence, iterate_values
 
 _INTEGER = re.compile(r"-?\d{1,6}")
+_MAX_PARTS = 50
 _OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
 
 
@@ -29,6 +30,8 @@ def hint_about_first_number(clues: Clues) -> Iterator[str]:
         if not _INTEGER.fullmatch(word.actual) or not _INTEGER.fullmatch(word.expected[0]):
             continue
         actual, expected = int(word.actual), int(word.expected[0])
+        if abs(expected - actual) != 1:
+            return
         hint = _describe_first_range(clues, actual, expected) or _describe_first_count(clues, actual, expected)
         if hint:
             yield hint
@@ -45,11 +48,8 @@ def _describe_first_range(clues: Clues, actual: int, expected: int) -> str:
         ):
             continue
         numbers = [listing.code.number(each) for each in call.arguments]
-        start = 0.0 if len(numbers) == 1 else numbers[0] if numbers else None
-        if start != actual or None in numbers:
+        if len(numbers) != 1 or numbers[0] is None or (actual, expected) != (0, 1):
             return ""
-        end = numbers[0] if len(numbers) == 1 else numbers[1]
-        fixed_end = (end or 0) + expected - actual if len(numbers) == 1 else end
         return Sentence(
             "%(place)s: range(%(arguments)s) begins with %(actual)s, and %(expected)s is expected first. Write "
             "range(%(fixed)s)",
@@ -57,7 +57,7 @@ def _describe_first_range(clues: Clues, actual: int, expected: int) -> str:
             arguments=format_arguments(call.arguments),
             actual=actual,
             expected=expected,
-            fixed=", ".join([str(expected), f"{fixed_end:g}", *map(join_tokens, call.arguments[2:])]),
+            fixed=f"1, {numbers[0] + 1:g}",
         )
     return ""
 
@@ -112,7 +112,7 @@ def hint_about_count_step(clues: Clues) -> Iterator[str]:
 
 
 def hint_about_pass_count(clues: Clues) -> Iterator[str]:
-    """Yield a hint on ``range(3)`` around the moves of a figure that needs one pass more or less."""
+    """Yield a hint on ``range(3)`` around the moves of a figure that needs one pass more."""
     for criterion in clues.costliest_criteria[:1]:
         result = next(each for each in clues.results if each.id == criterion.id)
         values = (
@@ -126,16 +126,17 @@ def hint_about_pass_count(clues: Clues) -> Iterator[str]:
             is_moving = any(has_motor_call(each, LIMITED_MOVES) for each in body)
             if not count or not is_moving or any(each.has_token(statement.tokens[1]) for each in body):
                 continue
-            for right in (int(count) + 1, int(count) - 1):
-                pairs = [(had, had * right // int(count)) for had in numbers if had and had % int(count) == 0]
-                if any(needed in numbers and had > right for had, needed in pairs):
-                    yield Sentence(
-                        "%(place)s: the loop runs %(count)g times, and %(right)s are needed. Write range(%(right)s)",
-                        place=listing.locate(statement.line),
-                        count=count,
-                        right=right,
-                    )
-                    return
+            right = int(count) + 1
+            pairs = [(had, had * right // int(count)) for had in numbers if had % int(count) == 0]
+            # The numbers of figures and of their sides may be such a pair by chance, so both must be larger.
+            if any(needed in numbers and right < had <= _MAX_PARTS for had, needed in pairs):
+                yield Sentence(
+                    "%(place)s: the loop runs %(count)g times, and %(right)s are needed. Write range(%(right)s)",
+                    place=listing.locate(statement.line),
+                    count=count,
+                    right=right,
+                )
+                return
 
 
 def _writes(name: str, statements: tuple[Statement, ...]) -> bool:
