@@ -23,7 +23,7 @@ _FUNCTIONS = frozenset({"sin", "cos", "tan"})
 #: What a program that converts between radians and degrees contains.
 _CONVERSIONS = frozenset({"degrees", "radians", "rad2deg", "deg2rad"})
 _NUMBERS = re.compile(r"\b(?:180|57\.\d*|0\.017\d*|3\.14\d*)\b")
-_ONE_SIDE = ('"image_data left"', '"image_data right"', "'image_data left'", "'image_data right'")
+_ONE_SIDE = re.compile(r"""["']image_data (?:left|right)["']\Z""")
 
 
 def hint_about_unwaited_move(clues: Clues) -> Iterator[str]:
@@ -141,7 +141,7 @@ def hint_about_single_images(clues: Clues) -> Iterator[str]:
     if not any(isinstance(each, Collects) for each in clues.lost):
         return
     for listing, statement in collect_statements(clues):
-        text = next((token for token in statement.tokens if token in _ONE_SIDE), "")
+        text = next((token for token in statement.tokens if _ONE_SIDE.match(token)), "")
         if text and statement.has_token("print"):
             yield Sentence(
                 "%(place)s asks for the image of one sensor. Each image needs its label from the other sensor: write "

@@ -15,10 +15,10 @@ from service.language import translatable
 from sim.sentences import Sentence
 from submissions.criteria.code import Functions
 
-_LESS = r"less than|below|under|fewer than|smaller than|lower than"
-_MORE = r"more than|greater than|above|over|larger than|higher than"
 _RULE = re.compile(
-    rf"\b(?:(?P<less>{_LESS})|(?P<more>{_MORE})|(?P<least>at least)|(?P<most>at most|up to)) (?P<number>\d+(?:\.\d+)?)"
+    r"\b(?:(?P<less>less than|below|under|fewer than|smaller than|lower than)"
+    r"|(?P<more>more than|greater than|above|over|larger than|higher than)"
+    r"|(?P<least>at least)|(?P<most>at most|up to)) (?P<number>\d+(?:\.\d+)?)"
 )
 #: Whether a number itself belongs to the upper side of the border in a rule.
 _IS_UPPER = {"less": True, "more": False, "least": True, "most": False}
