@@ -25,7 +25,10 @@ def _iterate_lines(check: Check) -> Iterator[str]:
 
 
 def format_check_as_html(check: Check) -> str:
-    """Return the report as HTML. Its hidden buttons open moments of the replay where there is one."""
+    """Return the report as HTML. Its hidden buttons open moments of the replay where there is one.
+
+    Saved notebooks show it without the widget's style sheet, so the table's cells have their own alignment.
+    """
     rows = "".join(_build_row(criterion, _build_watch_button(check, criterion)) for criterion in check.criteria)
     steps = "".join(f"<p><b>Next:</b> {escape(step)}</p>" for step in check.next_steps)
     notes = "".join(f'<p class="soft small">Note: {escape(note)}</p>' for note in check.notes)
@@ -33,7 +36,8 @@ def format_check_as_html(check: Check) -> str:
         f'<div class="check"><h3>{escape(check.title)}</h3>'
         f'<p class="score"><b>{escape(check.marks)}</b> of {escape(check.out_of)} marks</p>'
         f"<p>{escape(check.happened)}</p>{steps}"
-        '<table><thead><tr><th scope="col">Criterion</th><th scope="col" class="number">Marks</th></tr></thead>'
+        '<table><thead><tr><th scope="col" style="text-align: left">Criterion</th>'
+        '<th scope="col" class="number">Marks</th></tr></thead>'
         f"<tbody>{rows}</tbody></table>{notes}</div>"
     )
 
@@ -42,8 +46,8 @@ def _build_row(criterion: CheckedCriterion, watch_button: str) -> str:
     state = "full" if criterion.passed else "none"
     found = f"<p>{escape(criterion.found)}</p>" if criterion.found else ""
     return (
-        f'<tr class="{state}"><th scope="row"><span class="sign">{_sign(criterion)}</span> {escape(criterion.title)}'
-        f"{watch_button}{found}</th>"
+        f'<tr class="{state}"><th scope="row" style="text-align: left; font-weight: normal">'
+        f'<span class="sign">{_sign(criterion)}</span> <b>{escape(criterion.title)}</b>{watch_button}{found}</th>'
         f'<td class="number">{escape(criterion.marks)} / {escape(criterion.out_of)}</td></tr>'
     )
 

@@ -341,6 +341,8 @@ def _describe_required_reading(criterion: StopOn, recording: Recording) -> str:
     """Return what the light sensor reads in the required place; empty if unknown."""
     if criterion.rgb is None and criterion.reflected is not None:
         minimum, maximum = criterion.reflected
+        if minimum == maximum:
+            return f"{minimum:g} %"
         return Sentence("%(least)g to %(most)g %%", least=minimum, most=maximum)
     colour = find_required_colour(criterion, recording)
     return "" if colour is None else _format_colour(colour)
