@@ -88,13 +88,11 @@ def hint_about_shared_colour(clues: Clues) -> Iterator[str]:
         if differences[channel] > _SAME_VALUE or differences[best] < _OTHER_VALUE:
             continue
         yield Sentence(
-            "%(place)s: the loop ends at once: %(name)s is %(start).0f at the start, and %(required).0f in the "
-            "required place as well. Ask for %(other)s, too: it is %(other_start).0f at the start, and "
-            "%(other_required).0f there",
+            "%(place)s: the loop ends at once, because %(name)s is %(start).0f at the start. Ask for "
+            "%(other)s, too: %(other_start).0f there, %(other_required).0f in the required place",
             place=listing.locate(statement.line),
             name=_CHANNELS[channel],
             start=start[channel],
-            required=required[channel],
             other=_CHANNELS[best],
             other_start=start[best],
             other_required=required[best],

@@ -39,13 +39,13 @@ def hint_about_unwaited_move(clues: Clues) -> Iterator[str]:
             continue
         template = (
             translatable(
-                "%(place)s switches the motors on, and nothing waits after it: the program ends at once. Write "
-                "%(owner)s.on_for_seconds(...) with a number of seconds as the last value, or add time.sleep(...)"
+                "%(place)s switches the motors on, and the program ends at once. Write "
+                "%(owner)s.on_for_seconds(...) with the seconds as the last value, or add time.sleep(...)"
             )
             if following is None
             else translatable(
-                "%(place)s switches the motors on, and nothing waits after it: line %(line)s follows at once. Write "
-                "%(owner)s.on_for_seconds(...) with a number of seconds as the last value, or add time.sleep(...)"
+                "%(place)s switches the motors on, and line %(line)s follows at once. Write "
+                "%(owner)s.on_for_seconds(...) with the seconds as the last value, or add time.sleep(...)"
             )
         )
         yield Sentence(
@@ -76,8 +76,8 @@ def hint_about_stop_before_loop(clues: Clues) -> Iterator[str]:
         if has_motor_call(earlier[-1], CONTINUOUS_MOVES):
             continue
         yield Sentence(
-            "%(place)s: the loop waits for another reading, but the robot has stopped in line %(line)s. Switch the "
-            "motors on above the loop, for example with tank_drive.on(10, 10)",
+            "%(place)s: the loop waits for another reading, but the robot stopped in line %(line)s. Switch "
+            "the motors on above the loop, with tank_drive.on(10, 10)",
             place=listing.locate(loop.line),
             line=earlier[-1].line,
         )
@@ -130,8 +130,8 @@ def hint_about_straight_turn(clues: Clues) -> Iterator[str]:
     for listing, statement, call in turns[:1] if len(turns) == 1 else ():
         if listing.code.number(call.arguments[0]) == 0:
             yield Sentence(
-                "%(place)s steers by 0, so the robot drives straight on and still faces away. To turn on the spot, "
-                "write -100 or 100 instead of 0",
+                "%(place)s steers by 0, so the robot drives straight on. To turn on the spot, write -100 or "
+                "100 instead of 0",
                 place=listing.locate(statement.line),
             )
 

@@ -151,8 +151,8 @@ def hint_about_counted_rest(clues: Clues) -> Iterator[str]:
         if len(comparisons) == 1:
             listing, number = comparisons[0]
             yield Sentence(
-                "%(place)s: %(value)s is the number of all pixels but the %(expected)s that should count. Turn the "
-                "comparison round: write < for >, or > for <",
+                "%(place)s: %(value)s is the number of all pixels but the %(expected)s that should count. "
+                "Turn the comparison round: < for >, > for <",
                 place=listing.locate(number),
                 value=value,
                 expected=missing.entry,

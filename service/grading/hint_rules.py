@@ -57,9 +57,8 @@ def hint_about_missing_branch(clues: Clues) -> Iterator[str]:
             if last is None or len(conditions) < 2 or conditions[-1] is not last:
                 continue
             yield Sentence(
-                "%(place)s is the last line in which %(function)s returns a value. If no condition is true, "
-                "%(function)s returns nothing. Add a return for this case below it, with the indentation of line "
-                "%(line)s",
+                "%(place)s: if no condition is true, %(function)s returns nothing. Add a return for this case "
+                "below, with the indentation of line %(line)s",
                 place=listing.locate(last.last_line + _count_lines(listing, last)),
                 function=head.tokens[1],
                 line=last.line,

@@ -65,8 +65,8 @@ def _describe_wheel_factor(minimum: float, maximum: float, clues: Clues) -> str:
     if not minimum <= math.pi * diameter / 360 <= maximum:
         return ""
     return Sentence(
-        "It is in degrees of the wheels. For millimetres write / 360 * math.pi * %(diameter)g behind it, in brackets "
-        "if needed, with import math above",
+        "It is in degrees of the wheels. For millimetres, write / 360 * math.pi * %(diameter)g behind it, "
+        "and import math above",
         diameter=diameter,
     )
 

@@ -72,16 +72,16 @@ def describe_turn_from_line(
             )
         line, first, second = difference
         return Sentence(
-            "%(place)s has the wrong sign, so the robot turns away from the line as soon as it leaves it. Write "
-            "%(second)s - %(first)s in place of %(first)s - %(second)s",
+            "%(place)s has the wrong sign, so the robot turns away from the line. Write %(second)s - "
+            "%(first)s in place of %(first)s - %(second)s",
             place=listing.locate(line),
             first=first,
             second=second,
         )
     if turns and max(turns) <= 0:
         return Sentence(
-            "%(place)s turns the robot to the line, but too slowly for its speed, so it loses the line. Drive slower, "
-            "or multiply the difference by a larger number",
+            "%(place)s turns the robot to the line, but too slowly for its speed. Drive slower, or multiply "
+            "the difference by a larger number",
             place=listing.locate(statement.line),
         )
     return ""

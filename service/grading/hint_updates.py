@@ -59,8 +59,8 @@ def check_stale_comparison(listing: Listing, statement: Statement) -> str:
             continue
         if bindings[0].target == name and bindings[0].tokens[2] in _EMPTY_VALUES:
             return Sentence(
-                "%(place)s compares %(value)s with %(name)s, which is always %(start)s, because no line in the loop "
-                "changes it. Write %(name)s = %(value)s as the last line of the loop",
+                "%(place)s compares %(value)s with %(name)s, which is always %(start)s: the loop does not "
+                "change it. End the loop with %(name)s = %(value)s",
                 place=listing.locate(statement.line),
                 value=loop.tokens[1],
                 name=name,
@@ -89,8 +89,8 @@ def check_reset_before_step(listing: Listing, statement: Statement) -> str:
         )
     else:
         template = translatable(
-            "%(place)s sets %(name)s to %(value)s in each pass of the loop, so line %(line)s does not count on. Move "
-            "it above the loop in line %(loop)s"
+            "%(place)s sets %(name)s to %(value)s in each pass, so line %(line)s does not count on. Move it "
+            "above the loop in line %(loop)s"
         )
     return Sentence(
         template,
@@ -122,8 +122,8 @@ def check_kept_list(listing: Listing, statement: Statement) -> str:
         )
         if default is not None:
             return Sentence(
-                "%(place)s makes the list %(name)s only once, so it keeps the values of earlier calls. Write %(name)s "
-                "= [] as the first line of %(function)s, and not in the brackets",
+                "%(place)s makes the list %(name)s only once, so it keeps earlier values. Write %(name)s = "
+                "[] as the first line of %(function)s",
                 place=listing.locate(statement.line),
                 name=name,
                 function=tokens[1],

@@ -124,7 +124,7 @@ def test_the_pair_for_students_gets_full_marks() -> None:
 
 
 def test_the_assignment_shown_is_in_order(tmp_path: Path) -> None:
-    text = re.search(r"```toml\n(.*?)```", (ROOT / "docs" / "instructors.md").read_text(), re.DOTALL)
+    text = re.search(r"```toml\n(id = .*?)```", (ROOT / "docs" / "instructors.md").read_text(), re.DOTALL)
     assert text is not None
     (tmp_path / "assignment.toml").write_text(text[1])
     assignment = find_assignment(str(tmp_path))
