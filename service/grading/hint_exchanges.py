@@ -152,7 +152,7 @@ def hint_about_counted_rest(clues: Clues) -> Iterator[str]:
             listing, number = comparisons[0]
             yield Sentence(
                 "%(place)s: %(value)s is the number of all pixels but the %(expected)s that should count. "
-                "Turn the comparison round: < for >, > for <",
+                "Turn the comparison round: exchange > and <",
                 place=listing.locate(number),
                 value=value,
                 expected=missing.entry,
