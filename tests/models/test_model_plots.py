@@ -112,6 +112,7 @@ def test_a_level_that_is_asked_for_and_a_single_point_are_drawn() -> None:
     assert "n = 12 images per point" in texts(drawing)
 
 
+@pytest.mark.long
 def test_the_list_has_every_model_with_its_interval() -> None:
     done = robomark("models", "list")
     assert done.returncode == 0

@@ -129,6 +129,7 @@ def test_a_run_has_the_hash_of_robomark_run_with_the_same_answers(
     assert again.run is not None
 
 
+@pytest.mark.long
 def test_a_notebook_is_checked_and_submitted_and_followed(engine: ServerEngine, server: Server) -> None:
     check = engine.check("echo-responder", "ada.ipynb", _notebook(), {"notes.txt": b"1"})
     assert check.marks == check.out_of

@@ -79,6 +79,7 @@ def test_program_and_responder_import_what_lies_beside_them(tmp_path: Path, runn
     assert [message.text for message in recording.messages] == ["PY::hello hello hello ", "heard hello hello "]
 
 
+@pytest.mark.long
 def test_cells_and_their_robot_programs_import_it_too(tmp_path: Path, runner: TrialRunner) -> None:
     cells = ["import helper\n" + ANSWER, "%%sim_magic_preloaded -R -L\n" + DRIVE, "helper.__file__, helper.__name__"]
     own = tmp_path / "own"

@@ -176,6 +176,7 @@ def collected(runner: TrialRunner, name: str) -> Recording:
     return grade(submission, assignment, runner=runner).trials[0].recording
 
 
+@pytest.mark.long
 def test_pairs_of_the_log_know_what_they_show(runner: TrialRunner) -> None:
     recording = collected(runner, "reference")
     pairs = collect_pairs(recording, "log")
@@ -195,6 +196,7 @@ def collected_grade(runner: TrialRunner) -> Grade:
     return grade(submission, assignment, runner=runner)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "marks"),
     [({}, 4), ({"each": 4}, 4), ({"each": 50}, 0), ({"classes": ("square",)}, 4), ({"most_duplicates": 0.0}, 0)],

@@ -30,6 +30,7 @@ def test_a_catalogue_has_all_that_pages_say(code: str) -> None:
             assert sorted(_PLACES.findall(message.id)) == sorted(_PLACES.findall(str(message.string))), message.id
 
 
+@pytest.mark.long
 def test_a_reader_gets_the_language_they_ask_for(tmp_path: Path) -> None:
     with web_in(tmp_path) as web:
         nobody = web.browser()

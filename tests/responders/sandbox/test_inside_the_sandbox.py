@@ -77,6 +77,7 @@ def folder(empty: Path) -> Path:
     return empty
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", quick_first(_MODELS, 3))
 def test_models_learn(name: str, sandboxes: Sandboxes, empty: Path) -> None:
     _says(sandboxes, empty, _DATA + _MODELS[name] + _LEARN, ["True (3,)"])

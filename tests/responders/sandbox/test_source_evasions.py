@@ -120,6 +120,7 @@ def test_a_refused_import_is_an_error_of_its_line_and_a_note(tmp_path: Path, run
     assert recording.notes == ("line 1 of the responder: joblib is not allowed in this assignment",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rules", [{"avoids": ["joblib"]}, {"avoids": ["import joblib"], "marks": "0"}, {}])
 def test_only_what_carries_marks_is_refused(rules: dict[str, Any], tmp_path: Path, runner: TrialRunner) -> None:
     text = "import joblib\ndef f(): return True\n"

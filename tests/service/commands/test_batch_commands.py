@@ -64,6 +64,7 @@ def _batch_id(ended: Ended) -> str:
     return match[1]
 
 
+@pytest.mark.long
 def test_submit_and_wait_ends_with_marks_and_reports(graded: tuple[Path, Ended, Path]) -> None:
     home, ended, reports = graded
     assert ended.status == 2

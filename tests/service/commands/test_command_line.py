@@ -208,6 +208,7 @@ def test_run_takes_an_image_as_its_floor_and_modules_beside(tmp_path: Path) -> N
     assert "it must be a PNG or JPEG of 2362 x 1143 pixels" in robomark("run", program, "-b", small).stderr
 
 
+@pytest.mark.long
 def test_run_says_how_long_a_responder_may_compute(tmp_path: Path) -> None:
     (tmp_path / "responder.py").write_text("while True:\n    pass\n")
     program = tmp_path / "robot.py"

@@ -199,6 +199,7 @@ def test_the_tables_list_the_survivors(check: MutantCheck, capsys: pytest.Captur
     assert re.search(r"drive +robot.py +4 +larger number +2 -> 3\n", capsys.readouterr().out)
 
 
+@pytest.mark.long
 def test_the_command_grades_as_many_as_it_may(assignment: Path) -> None:
     ended = robomark("assignments", "check", str(assignment), "--mutants", "3", "--json")
     [checked] = json.loads(ended.stdout)["assignments"]

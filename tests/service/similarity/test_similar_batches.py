@@ -85,6 +85,7 @@ def test_a_copy_that_was_rewritten_is_found_by_its_path_and_its_recordings(runne
     assert similarity.same_recordings == (("ada", "eva"),)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trials", [1, 2])
 def test_students_who_use_the_follower_of_the_lecture_are_no_pair(runner: TrialRunner, trials: int) -> None:
     lecture = EDGE_FOLLOWER.format(speed=14, gain=0.4, edge=50)

@@ -332,6 +332,7 @@ def _race(settings: Settings, number: int, counts: Any) -> None:
     counts.put(claimed)
 
 
+@pytest.mark.long
 def test_four_processes_claim_no_job_twice(service_settings: Settings) -> None:
     with open_store(service_settings) as store:
         _batch(store, "race", 60)
@@ -350,6 +351,7 @@ def test_four_processes_claim_no_job_twice(service_settings: Settings) -> None:
         assert session.scalars(select(Job.attempt).distinct()).all() == [1]
 
 
+@pytest.mark.long
 def test_two_batches_at_once_number_attempts_one_by_one(tmp_path: Path) -> None:
     settings = settings_in(tmp_path)
     open_store(settings).close()

@@ -491,6 +491,7 @@ def test_marks_are_taken_away_as_files(web: Web, grace: TestClient) -> None:
     )
 
 
+@pytest.mark.long
 def test_a_provisional_grade_is_marked_in_lists_and_held_back(web: Web) -> None:
     world = make_world(web)
     grace, batch = web.browser(world.grace), f"/courses/1/batches/{world.values['batch_id']}"

@@ -94,6 +94,7 @@ def test_it_is_sorted_and_searched(course: TestClient, query: str, students: str
     assert [row.split()[0] for row in _rows(course.get(f"{PATH}?{query}").text)] == students.split()
 
 
+@pytest.mark.long
 def test_the_table_the_api_and_the_command_have_the_same_marks(web: Web, course: TestClient) -> None:
     table = list(csv.DictReader(io.StringIO(course.get(f"{PATH}/table").text.removeprefix("\ufeff"))))
     assert [(row["student"], row["marks: echo-responder"], row["max_marks: json-queue"]) for row in table] == [
@@ -116,6 +117,7 @@ def test_the_table_the_api_and_the_command_have_the_same_marks(web: Web, course:
             assert row[f"marks: {cell['assignment']}"] == ("" if cell["marks"] is None else f"{cell['marks']:g}")
 
 
+@pytest.mark.long
 def test_assignments_with_hidden_names_are_left_out(web: Web, course: TestClient) -> None:
     with web.store.transaction() as session:
         open_assignments.hide_names(session, 1, "json-queue", names_hidden=True)
@@ -130,6 +132,7 @@ def test_assignments_with_hidden_names_are_left_out(web: Web, course: TestClient
     assert [column.assignment for column in whole.columns] == ["echo-responder", "json-queue"]
 
 
+@pytest.mark.long
 def test_it_is_for_the_instructors_of_the_course_only(web: Web, course: TestClient) -> None:
     stranger = web.instructor("linus", "other")
     assert web.browser(stranger).get(PATH).status_code == 404

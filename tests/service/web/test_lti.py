@@ -115,6 +115,7 @@ _OTHER_KEY = rsa.generate_private_key(65537, 2048)
 _NOW = int(time.time())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "header", "sentence"),
     [
