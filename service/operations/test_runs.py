@@ -13,7 +13,7 @@ from service.operations import own_submissions
 from service.operations.context import Actor, Service
 from service.operations.errors import NotFound
 from service.operations.lookup import require_own_enrolment
-from service.operations.own_submissions import Allowance
+from service.operations.own_submissions import Allowance, OwnSubmission
 from service.operations.own_views import find_opened_assignment, load_visible_assignment
 from service.operations.submissions import load_submission_target
 from service.reports.start_picture import StartPicture, build_start_picture
@@ -53,6 +53,7 @@ class TestRunView:
     seconds: float | None  # simulated; None without a scenario visible to students
     picture: StartPicture | None
     allowance: Allowance
+    counting: OwnSubmission | None  # the one whose marks count
     is_open: bool
     closed_at: datetime | None  # None if it is open, or was never opened
     line: StudentTestRun | None
@@ -101,6 +102,7 @@ def show_newest(
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
         sheet = build_task_sheet(visible_assignment)
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
+        counting = own_submissions.find_counting_submission(session, enrolment_id, assignment)
         opened = find_opened_assignment(session, course_id, assignment)
         newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
         line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
@@ -113,6 +115,7 @@ def show_newest(
         trial_assignment.scenarios[0].seconds if trial_assignment else None,
         build_start_picture(trial_assignment) if trial_assignment else None,
         allowance,
+        counting,
         opened is not None and opened.open,
         None if opened is None else opened.closed_at,
         line,

@@ -94,6 +94,7 @@ def _render_test_run(
         seconds=view.seconds,
         picture=view.picture,
         allowance=view.allowance,
+        counting=view.counting,
         is_open=view.is_open,
         closed_at=view.closed_at,
         origins=view.origins,

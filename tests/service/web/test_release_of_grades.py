@@ -209,7 +209,7 @@ def test_a_changed_published_mark_is_told_with_the_earlier_one(
     assert "Your marks changed" not in _read_pages(web, ada)
     acting.publish(web.store, batch_id, actor="grace")
     pages = _read_pages(web, ada)
-    assert pages.count("Your marks changed from 3 of 4 to 1 on ") == 4  # twice on the page of the submission
+    assert pages.count("Your marks changed from 3 of 4 to 1 of 4 on ") == 4  # twice on the page of the submission
     assert reason in pages
     token = web.token(ada, "read")
     change = web.browser().get("/api/v1/courses/1/mine/submissions/1", headers=token).json()["change"]
@@ -269,7 +269,8 @@ def test_a_file_rejected_in_a_batch_is_told_to_its_student_until_they_submit(web
 def test_a_student_is_told_before_they_submit_that_a_worse_or_late_attempt_counts(web: Web, ada: Member) -> None:
     page = f"{MINE}/{ASSIGNMENT}"
     _submit_herself(web, ada, marks=3)
-    assert "Your current grade is from attempt 1: 3 of 4 marks." in words(web.browser(ada).get(page).text)
+    for shown in (page, f"{page}/try"):
+        assert "Your current grade is from attempt 1: 3 of 4 marks." in words(web.browser(ada).get(shown).text)
     _set(web, PolicyLimits(datetime.now(UTC) + _PAST, late_days=2))
     assert "A new submission is late." in words(web.browser(ada).get(page).text)
 
