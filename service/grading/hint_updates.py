@@ -140,7 +140,7 @@ def check_kept_list(listing: Listing, statement: Statement) -> str:
 
 
 def check_discarded_result(listing: Listing, statement: Statement) -> str:
-    """Return a hint on ``answer_to(number)`` alone, if that function only computes a value and returns it."""
+    """Return a hint on ``answer_to(number)`` alone, if that function only computes a value that a loop waits for."""
     code, calls = listing.code, statement.calls
     if not calls or statement.tokens[1:2] != ("(",) or statement.tokens[0] != calls[0].name:
         return ""
@@ -151,22 +151,16 @@ def check_discarded_result(listing: Listing, statement: Statement) -> str:
     if not is_value or any(_has_effect(each) for each in body) or statement.tokens[-1] != ")":
         return ""
     waiting_names = _list_waiting_names(code, statement)
-    call = join_tokens(statement.tokens)
-    if len(waiting_names) == 1:
-        return Sentence(
-            "%(place)s calls %(function)s, and does not keep what it returns, so %(name)s does not change. Write "
-            "%(name)s = %(call)s",
-            place=listing.locate(statement.line),
-            function=name,
-            name=waiting_names[0],
-            call=call,
-        )
+    # Without a loop that waits for it, the call can be right, for example to show its result below a notebook's cell.
+    if len(waiting_names) != 1:
+        return ""
     return Sentence(
-        "%(place)s calls %(function)s, and does not keep what it returns. Give the result a name, as in result = "
-        "%(call)s, and use it",
+        "%(place)s calls %(function)s, and does not keep what it returns, so %(name)s does not change. Write "
+        "%(name)s = %(call)s",
         place=listing.locate(statement.line),
         function=name,
-        call=call,
+        name=waiting_names[0],
+        call=join_tokens(statement.tokens),
     )
 
 
