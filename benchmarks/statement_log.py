@@ -27,7 +27,9 @@ from service.store.tables.statements import StatementEntry
 from service.store.tables.submissions import Job
 
 _GRADES = 10_000
-#: The numbers of the manipulated grades, which are those of their entries.
+#: Of so many grades one is published, because published grades are spread over all.
+_STEP = 9
+#: The numbers of the manipulated entries.
 _CHANGED, _REMOVED, _BACK_DATED, _FORGED = 1234, 4321, 5678, 8765
 
 
@@ -58,7 +60,7 @@ def _check(store: Store, head: FiledHead) -> list[int]:
 
 def _publish_grades(store: Store) -> FiledHead:
     """Publish the first grades, and return the head of their log with all hashes."""
-    job_ids = [many_rows.format_grade_name(number) for number in range(_GRADES)]
+    job_ids = [many_rows.format_grade_name(_STEP * number) for number in range(_GRADES)]
     with store.transaction() as session:
         session.execute(update(Job).where(Job.id.in_(job_ids)).values(published_at=now(session)))
         state_publication(session, job_ids)
@@ -72,9 +74,9 @@ def _publish_grades(store: Store) -> FiledHead:
 def _manipulate(session: Session) -> None:
     """Change a mark, remove a grade, back-date an entry and forge a statement."""
     row = CriterionResultRow
-    is_changed = (row.job_id == many_rows.format_grade_name(_CHANGED), row.position == 0)
+    is_changed = (row.job_id == many_rows.format_grade_name(_STEP * _CHANGED), row.position == 0)
     session.execute(update(row).where(*is_changed).values(marks=99))
-    session.execute(delete(Job).where(Job.id == many_rows.format_grade_name(_REMOVED)))
+    session.execute(delete(Job).where(Job.id == many_rows.format_grade_name(_STEP * _REMOVED)))
     is_back_dated = StatementEntry.number == _BACK_DATED
     session.execute(update(StatementEntry).where(is_back_dated).values(made_at=datetime(2020, 1, 1, tzinfo=UTC)))
     entry = session.scalars(select(StatementEntry).where(StatementEntry.number == _FORGED)).one()

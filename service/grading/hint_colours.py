@@ -12,7 +12,7 @@ from types import MappingProxyType
 from service.grading.hint_clues import Clues
 from service.grading.hint_code import CodeStatements, Statement, is_name, join_tokens
 from service.grading.hint_structure import collect_statements, has_motor_call
-from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES
+from service.grading.hint_tables import CONTINUOUS_MOVES, LIMITED_MOVES, OPPOSITE_SIGNS
 from service.grading.judging.geometry import compute_positions
 from sim.recording import Recording
 from sim.recording_values import rebuild_floor
@@ -24,7 +24,6 @@ _CHANNELS = ("red", "green", "blue")
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 )
-_OPPOSITES: Mapping[str, str] = MappingProxyType({"<": ">", "<=": ">=", ">": "<", ">=": "<="})
 _SHORT_RUN_SECONDS = 0.5
 #: Values of a colour that are as near as this count as the same, from 0 to 255.
 _SAME_VALUE, _OTHER_VALUE = 40, 100
@@ -36,6 +35,8 @@ def hint_about_opposite_condition(clues: Clues) -> Iterator[str]:
     recording = next(iter(clues.recordings), None)
     if recording is None or not (clues.is_stationary or clues.seconds <= _SHORT_RUN_SECONDS):
         return
+    criterion = next((each for each in clues.lost if isinstance(each, StopOn)), None)
+    required = None if criterion is None else find_required_colour(criterion, recording)
     for listing, statement in collect_statements(clues):
         is_start = statement.keyword == "while" and statement.parent < 0
         body = listing.code.list_body(statement) if is_start else ()
@@ -43,15 +44,19 @@ def hint_about_opposite_condition(clues: Clues) -> Iterator[str]:
         if not any(has_motor_call(each, CONTINUOUS_MOVES | LIMITED_MOVES) for each in (*earlier, *body)) or not body:
             continue
         comparisons = list(_split_comparisons(statement.condition))
-        readings = [_read_operand(listing.code, left, recording) for left, _, _ in comparisons]
+        sources = [_find_source(listing.code, left) for left, _, _ in comparisons]
         limits = [listing.code.number(right) for _, _, right in comparisons]
-        opposite_signs = [_OPPOSITES.get(sign, "") for _, sign, _ in comparisons]
+        opposite_signs = [OPPOSITE_SIGNS.get(sign, "") for _, sign, _ in comparisons]
         known = [
-            (reading, sign, limit)
-            for reading, sign, limit in zip(readings, opposite_signs, limits, strict=True)
-            if reading is not None and limit is not None and sign
+            (source, sign, limit)
+            for source, sign, limit in zip(sources, opposite_signs, limits, strict=True)
+            if source is not None and limit is not None and sign
         ]
-        if not known or len(known) < len(comparisons) or not all(_COMPARISONS[s](r, n) for r, s, n in known):
+        starts = [_convert_colour(_read_start(recording, sensor), reading) for (sensor, reading), _, _ in known]
+        if not known or len(known) < len(comparisons) or not _are_all_true(starts, known):
+            return
+        # A loop whose opposite is true in the required place as well would not end there.
+        if _are_all_true([_convert_colour(required, reading) for (_, reading), _, _ in known], known):
             return
         first = join_tokens(comparisons[0][0])
         yield Sentence(
@@ -60,8 +65,8 @@ def hint_about_opposite_condition(clues: Clues) -> Iterator[str]:
             place=listing.locate(statement.line),
             condition=join_tokens(statement.condition),
             name=first,
-            reading=known[0][0],
-            opposite=join_tokens([_OPPOSITES.get(token, token) for token in statement.condition]),
+            reading=starts[0],
+            opposite=join_tokens([OPPOSITE_SIGNS.get(token, token) for token in statement.condition]),
         )
         return
 
@@ -142,16 +147,20 @@ def _split_comparisons(condition: Sequence[str]) -> Iterator[tuple[tuple[str, ..
             yield tuple(part), "", ()
 
 
-def _read_operand(code: CodeStatements, tokens: Sequence[str], recording: Recording) -> float | None:
-    """Return what a light reading, or the name that it has, is at the start; None for anything else."""
-    source = _find_source(code, tokens)
-    colour = None if source is None else _read_start(recording, source[0])
-    if source is None or colour is None:
+def _convert_colour(colour: Colour | None, reading: str) -> float | None:
+    """Return what a light sensor gives as this reading above a colour; None for an unknown colour or reading."""
+    if colour is None:
         return None
-    if source[1] in _CHANNELS:
-        return colour[_CHANNELS.index(source[1])]
-    scale = {"reflected_light_intensity_pc": 100 / 255, "reflected_light_intensity": 1.0}.get(source[1])
+    if reading in _CHANNELS:
+        return colour[_CHANNELS.index(reading)]
+    scale = {"reflected_light_intensity_pc": 100 / 255, "reflected_light_intensity": 1.0}.get(reading)
     return None if scale is None else colour[0] * scale
+
+
+def _are_all_true(values: Sequence[float | None], comparisons: Sequence[tuple[object, str, float]]) -> bool:
+    """Return whether each value is known and passes the comparison with its sign and limit."""
+    pairs = zip(values, comparisons, strict=True)
+    return all(value is not None and _COMPARISONS[sign](value, limit) for value, (_, sign, limit) in pairs)
 
 
 def _find_source(code: CodeStatements, tokens: Sequence[str]) -> tuple[str, str] | None:

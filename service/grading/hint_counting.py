@@ -13,12 +13,11 @@ from service.grading.hint_clues import Clues
 from service.grading.hint_code import LOOPS, Statement, join_tokens
 from service.grading.hint_slips import format_arguments
 from service.grading.hint_structure import DRIVING_CRITERIA, collect_statements, has_motor_call
-from service.grading.hint_tables import LIMITED_MOVES
+from service.grading.hint_tables import LIMITED_MOVES, OUTPUT_FUNCTIONS
 from sim.sentences import Sentence, iterate_values
 
 _INTEGER = re.compile(r"-?\d{1,6}")
 _MAX_PARTS = 50
-_OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
 
 
 def hint_about_first_number(clues: Clues) -> Iterator[str]:
@@ -142,5 +141,5 @@ def hint_about_pass_count(clues: Clues) -> Iterator[str]:
 def _writes(name: str, statements: tuple[Statement, ...]) -> bool:
     """Return whether a statement says or prints a name."""
     return any(
-        each.has_token(name) and any(call.name in _OUTPUT_FUNCTIONS for call in each.calls) for each in statements
+        each.has_token(name) and any(call.name in OUTPUT_FUNCTIONS for call in each.calls) for each in statements
     )

@@ -6,20 +6,19 @@ They apply only if visible criteria lost marks, and the outputs or answers show 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from service.grading.findings import FailedCall, MissingEntry
 from service.grading.hint_answers import parse_answer
 from service.grading.hint_clues import Clues, Listing
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_structure import collect_statements
+from service.grading.hint_tables import OPPOSITE_SIGNS, OUTPUT_FUNCTIONS
 from service.grading.judging.message_parts import quote_text
 from sim.sentences import Sentence
 from submissions.criteria.code import Functions
 from submissions.criteria.reporting import Reports
 
-_OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
-_OPPOSITES: Mapping[str, str] = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 _SIDES = (("right ", "downwards "), ("left ", "upwards "))
 #: Methods that give a chance for each name.
 _CHANCES = ("predict_proba", "class_predict", "decision_function")
@@ -80,7 +79,7 @@ def _find_branch(word: str, clues: Clues) -> tuple[Listing, Statement] | None:
     candidates = [
         (listing, each)
         for listing, each in collect_statements(clues)
-        if any(call.name in _OUTPUT_FUNCTIONS for call in each.calls)
+        if any(call.name in OUTPUT_FUNCTIONS for call in each.calls)
         and any(token[:1] in "\"'" and re.search(rf"\b{re.escape(word)}\b", token) for token in each.tokens)
         and each.parent >= 0
     ]
@@ -89,10 +88,10 @@ def _find_branch(word: str, clues: Clues) -> tuple[Listing, Statement] | None:
 
 def _turn_round(head: Statement) -> str:
     """Return the condition of a branch with its only sign turned round; empty if it has none or several."""
-    signs = [token for token in head.condition if token in _OPPOSITES]
+    signs = [token for token in head.condition if token in OPPOSITE_SIGNS]
     if head.keyword not in ("if", "elif") or len(signs) != 1:
         return ""
-    return join_tokens([_OPPOSITES.get(token, token) for token in head.condition])
+    return join_tokens([OPPOSITE_SIGNS.get(token, token) for token in head.condition])
 
 
 def hint_about_exchanged_axes(clues: Clues) -> Iterator[str]:

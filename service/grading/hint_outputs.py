@@ -12,12 +12,12 @@ from service.grading.hint_clues import Clues
 from service.grading.hint_code import Statement, join_tokens
 from service.grading.hint_operands import find_device
 from service.grading.hint_structure import collect_statements
+from service.grading.hint_tables import OUTPUT_FUNCTIONS
 from service.grading.judging.message_parts import quote_text
 from sim.sentences import Sentence
 from submissions.criteria.reporting import Reports
 from submissions.criteria.texts import TextSequence
 
-_OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
 #: Python's text for an object without one of its own.
 _OBJECT = re.compile(r"<(?P<kind>function|bound method|class|[\w.]+) .*(?:object )?at 0x[0-9a-f]+>|<class '[\w.]+'>")
 
@@ -73,12 +73,12 @@ def hint_about_missing_else(clues: Clues) -> Iterator[str]:
 
 
 def _is_output(statement: Statement) -> bool:
-    return any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls)
+    return any(call.name in OUTPUT_FUNCTIONS for call in statement.calls)
 
 
 def _get_literal(statement: Statement) -> str:
     """Return the text that a statement writes, if it is only a text in quotes; otherwise empty."""
-    call = next((each for each in statement.calls if each.name in _OUTPUT_FUNCTIONS and each.arguments), None)
+    call = next((each for each in statement.calls if each.name in OUTPUT_FUNCTIONS and each.arguments), None)
     token = join_tokens(call.arguments[0]) if call is not None else ""
     return token[1:-1] if token[:1] in ("'", '"') and token[-1:] == token[:1] else ""
 

@@ -14,12 +14,12 @@ from service.grading.hint_code import Statement, is_name, join_tokens
 from service.grading.hint_differences import describe_factor
 from service.grading.hint_loops import describe_reading
 from service.grading.hint_structure import collect_statements
+from service.grading.hint_tables import OUTPUT_FUNCTIONS
 from sim.recording_values import get_recorded_robot
 from sim.sentences import Sentence
 from submissions.criteria.reporting import Reports
 
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-_OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
 _RAW_READINGS = frozenset({"red", "green", "blue", "reflected_light_intensity"})
 _MAX_PERCENT, _RAW_PER_PERCENT = 100, 2.55
 _OPERATORS = frozenset("+-*/")
@@ -106,7 +106,7 @@ def hint_about_colour_number(clues: Clues) -> Iterator[str]:
         for listing, statement in collect_statements(clues):
             tokens = statement.tokens
             index = next((at for at, token in enumerate(tokens) if token in ("color", "color_name") and at > 1), None)
-            is_output = any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls) or statement.target
+            is_output = any(call.name in OUTPUT_FUNCTIONS for call in statement.calls) or statement.target
             if index is not None and is_output and tokens[index - 1] == ".":
                 yield Sentence(
                     "%(place)s reads %(reading)s, which is one value for the whole colour. Write %(sensor)s.rgb for "
@@ -122,7 +122,7 @@ def _find_raw_output(clues: Clues) -> tuple[Listing, int, str] | None:
     """Return the first output with a reading from 0 to 255."""
     for listing, statement in collect_statements(clues):
         reading = next((token for token in statement.tokens if token in _RAW_READINGS), "")
-        if reading and any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls):
+        if reading and any(call.name in OUTPUT_FUNCTIONS for call in statement.calls):
             return listing, statement.line, reading
     return None
 
@@ -131,7 +131,7 @@ def _find_calculation(clues: Clues) -> tuple[Listing, Statement] | None:
     """Return the only calculation of a name that is printed or said."""
     candidates = []
     for listing, statement in collect_statements(clues):
-        if any(call.name in _OUTPUT_FUNCTIONS for call in statement.calls):
+        if any(call.name in OUTPUT_FUNCTIONS for call in statement.calls):
             names = {token for token in statement.tokens if is_name(token)}
             candidates += [
                 (listing, each)

@@ -65,6 +65,8 @@ def describe_turn_from_line(
     turns = [turn for each in recordings if (turn := _measure_leaving_turn(criterion, each)) is not None]
     if turns and min(turns) > _MIN_TURN:
         difference = _find_difference(listing, call)
+        if difference is None and all(listing.code.number(each) is not None for each in call.arguments):
+            return ""  # constant speeds have no sign to change; the branches around them decide
         if difference is None:
             return Sentence(
                 "%(place)s turns the robot away from the line as soon as it leaves it. Change the sign of the steering",

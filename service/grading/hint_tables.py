@@ -44,6 +44,12 @@ USAGE: Mapping[str, str] = MappingProxyType(
     }
 )
 
+#: Functions whose texts students see or hear.
+OUTPUT_FUNCTIONS = frozenset({"say", "print", "speak"})
+
+#: The sign of a comparison that is turned round.
+OPPOSITE_SIGNS: Mapping[str, str] = MappingProxyType({"<": ">", "<=": ">=", ">": "<", ">=": "<="})
+
 #: Properties of sensors and motors: minimum, maximum, and a sentence on the range or unit.
 READINGS: Mapping[str, tuple[float, float, str]] = MappingProxyType(
     {

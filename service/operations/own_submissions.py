@@ -174,13 +174,6 @@ def load_own_attempts(session: Session, enrolment_id: int, assignment: str) -> O
     )
 
 
-def find_counting_submission(session: Session, enrolment_id: int, assignment: str) -> OwnSubmission | None:
-    """Return the student's submission to an assignment whose marks count; None if there is none."""
-    query = _select_submissions(session, enrolment_id)
-    query = query.where(SubmissionRow.assignment == assignment, _is_counting(enrolment_id))
-    return next((each for each in _load_submissions(session, query) if each.counts), None)
-
-
 def find_newest_row(session: Session, enrolment_id: int, assignment: str) -> SubmissionRow | None:
     """Return a student's newest submission to an assignment, with its files; None if there is none."""
     is_own = (SubmissionRow.enrolment_id == enrolment_id, SubmissionRow.assignment == assignment)

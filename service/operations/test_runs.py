@@ -102,7 +102,7 @@ def show_newest(
         visible_assignment = load_visible_assignment(session, course_id, enrolment_id, assignment)
         sheet = build_task_sheet(visible_assignment)
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
-        counting = own_submissions.find_counting_submission(session, enrolment_id, assignment)
+        counting = own_submissions.load_own_attempts(session, enrolment_id, assignment).counting
         opened = find_opened_assignment(session, course_id, assignment)
         newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
         line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
