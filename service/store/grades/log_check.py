@@ -44,7 +44,6 @@ _MARKS_KINDS = (FactKind.TOTAL, FactKind.CRITERION, FactKind.HIDDEN_CRITERION)
 _MARKS_WORDS = tuple(kind.value for kind in _MARKS_KINDS)
 _STATING_CHANGES = (None, Change.PUBLISHED.value, Change.CHANGED.value)
 
-_IS_PUBLISHED = (Job.standing == Standing.STANDS, Job.published_at.is_not(None), Job.state == JobState.DONE)
 #: The published grades. Outer joins, because tampering may have removed the row of a submission or a student.
 _SELECT_PUBLISHED = (
     select(
@@ -55,7 +54,7 @@ _SELECT_PUBLISHED = (
     .outerjoin(SubmissionRow, Job.submission_id == SubmissionRow.id)
     .outerjoin(Enrolment, SubmissionRow.enrolment_id == Enrolment.id)
     .outerjoin(AssignmentVersion, Job.assignment_version_id == AssignmentVersion.id)
-    .where(*_IS_PUBLISHED)
+    .where(Job.standing == Standing.STANDS, Job.published_at.is_not(None), Job.state == JobState.DONE)
     .order_by(Job.id)
 )
 
@@ -318,14 +317,10 @@ def _compare_submission(row: Any, entry: _Entry, findings: _Findings) -> None:
     findings.name_grade(entry.number, row.id, f"was moved: its {what} is not that of entry {entry.number}")
 
 
-def _compare_marks(session: Session, entries_by_job: dict[str, _Entry], findings: _Findings) -> None:
-    """Name grades whose marks are not those of their statements. They are in the order of ids."""
-    first, last = next(iter(entries_by_job)), next(reversed(entries_by_job))
-    job_ids = select(Job.id).where(Job.id.between(first, last), *_IS_PUBLISHED)
-    for job_id, facts in load_marks_facts(session, job_ids).items():
-        entry = entries_by_job.get(job_id)
-        if entry is None:
-            continue
+def _compare_marks(session: Session, entries_by_job: Mapping[str, _Entry], findings: _Findings) -> None:
+    """Name grades whose marks are not those of their statements."""
+    for job_id, facts in load_marks_facts(session, entries_by_job).items():
+        entry = entries_by_job[job_id]
         actual, stated = facts.commit(entry.opening_key, *_MARKS_KINDS), entry.commitments
         if actual != stated:
             changed = next(kind for kind in _MARKS_KINDS if actual[kind.value] != stated.get(kind.value))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
 
-from sqlalchemy import ColumnElement, Select, and_, exists, select, update
+from sqlalchemy import ColumnElement, and_, exists, select, update
 from sqlalchemy.orm import Session
 
 from service.store import audit
@@ -145,9 +145,7 @@ def withdraw_override(
     _recount_all(session, submission_id)
 
 
-def load_overrides(
-    session: Session, job_ids: Collection[str] | Select[str]
-) -> Mapping[str, Mapping[str, OverrideLine]]:
+def load_overrides(session: Session, job_ids: Collection[str]) -> Mapping[str, Mapping[str, OverrideLine]]:
     """Return the overrides for the submissions of these jobs, by job and criterion, without jobs that have none."""
     query = (
         select(Job.id, Override)

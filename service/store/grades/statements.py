@@ -12,7 +12,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import Select, select
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service.statements.facts import (
@@ -106,8 +106,8 @@ def load_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFac
     return facts_by_job
 
 
-def load_marks_facts(session: Session, job_ids: Collection[str] | Select[str]) -> dict[str, GradeFacts]:
-    """Return the facts of grades by job, without those on trials. A query of the ids takes less time than many ids."""
+def load_marks_facts(session: Session, job_ids: Collection[str]) -> dict[str, GradeFacts]:
+    """Return the facts of grades by job, without those on trials."""
     facts_by_job = {}
     totals_query = select(Job.id, Job.marks, Job.max_marks, Job.provisional).where(Job.id.in_(job_ids))
     for job_id, marks, max_marks, provisional in session.execute(totals_query):
