@@ -28,8 +28,9 @@ def describe_skipped_loops(clues: Clues) -> Iterator[tuple[str, str]]:
         is_driving = any(
             has_motor_call(other, CONTINUOUS_MOVES) for other in listing.code.statements[: statement.number]
         )
-        if statement.keyword == "while" and reading and is_driving and not _is_true_at_zero(listing, statement):
-            yield _explain_skipped_loop(listing, statement, reading)
+        if statement.keyword == "while" and reading and is_driving:
+            explain = _explain_early_end if _is_true_at_zero(listing, statement) else _explain_skipped_loop
+            yield explain(listing, statement, reading)
             return
 
 
@@ -41,6 +42,17 @@ def _is_true_at_zero(listing: Listing, loop: Statement) -> bool:
         return False
     limit = listing.code.number(tokens[index + 1 :])
     return limit is not None and (limit > 0 if tokens[index][0] == "<" else limit < 0)
+
+
+def _explain_early_end(listing: Listing, loop: Statement, reading: str) -> tuple[str, str]:
+    """Return why a loop ends after its first passes, twice."""
+    explanation = Sentence(
+        "%(place)s: the loop ends early, as soon as %(condition)s is false. %(range)s. Check the number",
+        place=listing.locate(loop.line),
+        condition=join_tokens(loop.condition),
+        range=describe_reading(reading),
+    )
+    return explanation, explanation
 
 
 def _explain_skipped_loop(listing: Listing, loop: Statement, reading: str) -> tuple[str, str]:

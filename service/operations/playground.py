@@ -82,12 +82,11 @@ def show_newest(service: Service, actor: Actor, course_id: int) -> PlaygroundVie
     """Return the actor's newest run in the playground, or a program to begin with. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, *_MEMBERS).id
-        newest_id = test_runs.find_newest_run(session, enrolment_id, PLAYGROUND_ID)
-        if newest_id is None:
+        line = test_runs.find_newest_run(session, enrolment_id, PLAYGROUND_ID)
+        if line is None:
             return PlaygroundView(DEFAULT_WORLD, (STARTER_PROGRAM, ""), None, None)
-        line = test_runs.find_student_run(session, enrolment_id, newest_id)
-        replay = test_runs.load_replay(session, newest_id)
-        packed_submission, content = test_runs.load_program(session, newest_id)
+        replay = test_runs.load_replay(session, line.id)
+        packed_submission, content = test_runs.load_program(session, line.id)
     texts = unpack_submission(packed_submission).read_texts(PLAYGROUND_FILES)
     return PlaygroundView(read_world(assignment_from_bytes(content)), texts, line, replay)
 
@@ -96,8 +95,7 @@ def find_newest(service: Service, actor: Actor, course_id: int) -> StudentTestRu
     """Return the state of the actor's newest run in the playground; None if there is none. Raises NotFound."""
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, *_MEMBERS).id
-        newest_id = test_runs.find_newest_run(session, enrolment_id, PLAYGROUND_ID)
-        return test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
+        return test_runs.find_newest_run(session, enrolment_id, PLAYGROUND_ID)
 
 
 def list_floors() -> tuple[str, ...]:

@@ -104,9 +104,8 @@ def show_newest(
         allowance = own_submissions.compute_allowance(session, enrolment_id, assignment)
         counting = own_submissions.load_own_attempts(session, enrolment_id, assignment).counting
         opened = find_opened_assignment(session, course_id, assignment)
-        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
-        line = test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
-        replay = test_runs.load_replay(session, newest_id) if newest_id else None
+        line = test_runs.find_newest_run(session, enrolment_id, assignment)
+        replay = test_runs.load_replay(session, line.id) if line else None
         texts_by_origin = _load_texts(session, enrolment_id, sheet, line)
     trial_assignment = build_single_trial_assignment(visible_assignment)
     shown_origin = origin if origin in texts_by_origin else next(iter(texts_by_origin), None)
@@ -151,19 +150,15 @@ def show_newest_result(service: Service, actor: Actor, course_id: int, assignmen
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
         sheet = build_task_sheet(load_visible_assignment(session, course_id, enrolment_id, assignment))
-        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
-        if newest_id is None:
-            return TestRunResult(None, None, sheet.asked)
-        line = test_runs.find_student_run(session, enrolment_id, newest_id)
-        return TestRunResult(line, test_runs.load_replay(session, newest_id), sheet.asked)
+        line = test_runs.find_newest_run(session, enrolment_id, assignment)
+        return TestRunResult(line, test_runs.load_replay(session, line.id) if line else None, sheet.asked)
 
 
 def find_newest(service: Service, actor: Actor, course_id: int, assignment: str) -> StudentTestRun | None:
     """Return the state of the actor's newest test run of an assignment; None if there is none."""
     with service.store.reading() as session:
         enrolment_id = require_own_enrolment(session, actor, course_id, Role.STUDENT).id
-        newest_id = test_runs.find_newest_run(session, enrolment_id, assignment)
-        return test_runs.find_student_run(session, enrolment_id, newest_id) if newest_id else None
+        return test_runs.find_newest_run(session, enrolment_id, assignment)
 
 
 def show(service: Service, actor: Actor, course_id: int, tryout_id: str) -> StudentTestRun:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, cast
 
-from sqlalchemy import ColumnElement, CursorResult, and_, delete, func, or_, select, update
+from sqlalchemy import ColumnElement, CursorResult, Select, and_, delete, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from service.store.engine import Store, now, retry_conflicts
@@ -221,27 +221,29 @@ def load_program(session: Session, tryout_id: str) -> tuple[bytes, bytes]:
     return packed_submission, content if own_content is None else own_content
 
 
-def find_newest_run(session: Session, enrolment_id: int, assignment: str) -> str | None:
-    """Return the id of a student's newest test run of an assignment; None if there is none."""
-    query = (
-        select(Tryout.id)
-        .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
-        .where(Tryout.enrolment_id == enrolment_id, AssignmentVersion.assignment == assignment)
-    )
-    return session.scalar(query.order_by(Tryout.queued_at.desc(), Tryout.id).limit(1))
+def find_newest_run(session: Session, enrolment_id: int, assignment: str) -> StudentTestRun | None:
+    """Return a student's newest test run of an assignment; None if there is none."""
+    query = _select_student_runs(enrolment_id).where(AssignmentVersion.assignment == assignment)
+    return _find_run(session, query.order_by(Tryout.queued_at.desc(), Tryout.id).limit(1))
 
 
 def find_student_run(session: Session, enrolment_id: int, tryout_id: str) -> StudentTestRun | None:
     """Return one test run of a student; None if the student does not have it."""
-    query = (
+    return _find_run(session, _select_student_runs(enrolment_id).where(Tryout.id == tryout_id))
+
+
+def _select_student_runs(enrolment_id: int) -> Select[Tryout, str, str]:
+    return (
         select(Tryout, AssignmentVersion.assignment, AssignmentVersion.title)
         .join(AssignmentVersion, Tryout.assignment_version_id == AssignmentVersion.id)
         .where(
-            Tryout.id == tryout_id,
             Tryout.enrolment_id == enrolment_id,
             AssignmentVersion.assignment.not_in([NOTEBOOK_RUNS, NOTEBOOK_CHECKS]),
         )
     )
+
+
+def _find_run(session: Session, query: Select[Tryout, str, str]) -> StudentTestRun | None:
     run_row = session.execute(query).one_or_none()
     if run_row is None:
         return None
